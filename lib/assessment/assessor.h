@@ -1,0 +1,59 @@
+// Learns an object's measures from virtual views of its (partial) model (section VI): no ground truth needed.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "measures/completeness.h"
+#include "model/object_model.h"
+#include "recognition/recogniser.h"
+
+namespace vantage::assessment {
+
+struct TrialParams {
+  int trials_per_view = 40;        // Virtual images per learned view, each offering only that view; >= 1.
+  int negatives_per_view = 10;     // Images without the object; >= 0.
+  double max_rotation_deg = 60.0;  // Out of plane, uniform in 0..max; (0, 90].
+  double max_scale_octaves = 1.0;  // log2 scale uniform in +-max: 1 = 0.5..2 times the distance; >= 0.
+  double max_image_noise = 16.0;   // Sigma, grey levels, one of 8 even levels from 0; >= 0.
+  double max_blur_px = 1.6;        // Sigma, one of 8 even levels from 0; >= 0.
+  double max_brightness = 0.25;    // Relative change of brightness, and of gamma; [0, 1).
+  double correct_m = 0.04;         // Mean point distance below which a detection is right; > 0.
+  int image_width = 320;           // Virtual images are crops around the object of this size at most.
+  int image_height = 240;
+  std::uint32_t seed = 0;
+
+  void Check() const;
+};
+
+// One virtual image and what the recogniser made of it.
+struct Trial {
+  int view = 0;              // Index of the view offered.
+  bool object_shown = true;  // false: a negative, no object in the image.
+  double rotation_rad = 0.0;
+  double log2_scale = 0.0;
+  double image_noise = 0.0;
+  double blur_px = 0.0;
+  bool hypothesis = false;  // The recogniser proposed a pose.
+  double confidence = 0.0;  // Of the proposal; (2).
+  bool correct = false;     // The proposal is within correct_m of the truth.
+};
+
+// Trials for the views from `first_view` on. `backgrounds`: BGR images the object is pasted over (the run's own frames with the
+// objects masked, or photographs); plain grey noise where empty. Deterministic in (model, params). `progress` is called after every
+// trial.
+std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, const std::vector<cv::Mat>& backgrounds,
+                             const recognition::RecogniserParams& recogniser, const TrialParams& params,
+                             const std::function<void(int done, int of)>& progress = {});
+
+// Both measures from trials. A view counts as detected where the proposal is right and p(o|c) >= 1/2.
+measures::Measures FitMeasures(const std::vector<Trial>& trials, const recognition::RecogniserParams& recogniser,
+                               measures::Source source = measures::Source::kOwn);
+
+// Uniform p(theta) over the part of the view sphere between two elevations (radians, object z up) at the given distances.
+std::vector<measures::WeightedViewpoint> UniformViewpoints(double min_elevation_rad, double max_elevation_rad,
+                                                           const std::vector<double>& distances_m, int directions = 200);
+
+}  // namespace vantage::assessment

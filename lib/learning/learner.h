@@ -1,0 +1,84 @@
+// The online learner (section III): finds an object on the table, tracks it, adds keyframes, and never learns on a lost track.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "recognition/recogniser.h"
+#include "segmentation/clusters.h"
+#include "segmentation/plane.h"
+
+namespace vantage::learning {
+
+struct LearnerParams {
+  segmentation::PlaneParams plane;
+  segmentation::ClusterParams clusters;
+  recognition::RecogniserParams recogniser;
+  double new_view_confidence = 0.6;    // A new view is added when c falls below; (0, 1).
+  double min_track_probability = 0.7;  // ...but only with p(o|c) at least this; (0, 1).
+  double reference_confidence = 0.75;  // When c falls below, neighbouring views are tried as reference; (0, 1].
+  int min_view_points = 20;            // A view needs so many interest points with depth; >= 4.
+  double min_view_angle_deg =
+      8.0;  // A new view differs from every other by so much in direction (or by half an octave in distance); >= 0.
+  double max_mount_translation_m =
+      0.05;  // Where the mount's pose is known, a track that contradicts it by more is not trusted; > 0.
+  double max_mount_rotation_deg = 10.0;
+  bool require_mount_agreement = true;  // Use the check above where poses are known.
+  int lost_after = 5;                   // Frames without a track before relocalising by recognition; >= 1.
+
+  void Check() const;  // Throws std::invalid_argument naming the field.
+};
+
+enum class State { kSearching, kTracking, kLost, kRelocalising };
+std::string ToString(State state);
+
+// What one frame came to.
+struct LearnerResult {
+  State state = State::kSearching;
+  std::optional<geometry::Rigid> T_camera_object;  // Where the object is tracked.
+  model::Confidence confidence;
+  double probability = 0.0;  // p(o|c).
+  int reference_view = -1;   // Index of the tracked view.
+  int inliers = 0;
+  bool view_added = false;
+  std::string note;  // Why nothing was learned, in a few words; empty where there is nothing to say.
+};
+
+// Where to start: the cluster that holds this pixel; without it, the one nearest to the image centre.
+struct Target {
+  std::optional<Eigen::Vector2d> pixel;
+  cv::Mat mask;  // CV_8UC1 over the whole image: use this region instead of a cluster (ground-truth labels, tests); may be empty.
+};
+
+class Learner {
+ public:
+  // `name`: of a new object. `known`: go on with this model (it starts by relocalising).
+  Learner(const LearnerParams& params, const std::string& name, std::shared_ptr<const model::ObjectModel> known = nullptr);
+  ~Learner();
+  Learner(Learner&&) noexcept;
+  Learner& operator=(Learner&&) noexcept;
+
+  // One frame. Where the frame's T_world_camera is known it is used as a check (never needed). `known_pose`: place the object by
+  // this T_camera_object instead of tracking.
+  LearnerResult Process(const rgbd::Frame& frame, const Target& target = {},
+                        const std::optional<geometry::Rigid>& known_pose = std::nullopt);
+
+  // The model so far; null before the first view. A new object is made for every change: what was handed out stays as it was.
+  std::shared_ptr<const model::ObjectModel> object() const;
+  // The measures p(o|c) is judged by from now on.
+  void SetMeasures(const measures::Measures& measures);
+
+  // Table plane and clusters of the last frame that was segmented (camera coordinates of that frame).
+  const std::optional<segmentation::Plane>& plane() const;
+  // Where the object stands in the world: known once it was tracked in a frame with a known camera pose.
+  std::optional<geometry::Rigid> T_world_object() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vantage::learning

@@ -1,0 +1,53 @@
+// The model store: one SQLite file. One writer (the learner), any number of readers, also from other processes.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/object_model.h"
+
+namespace vantage::model {
+
+class Store {
+ public:
+  enum class Mode { kRead, kWrite };  // kWrite creates the file where there is none.
+
+  struct Summary {
+    std::string name;
+    int views = 0;
+    int points = 0;
+    std::int64_t revision = 0;  // Rises with every change to the object.
+    std::int64_t utime = 0;     // Capture time of the newest view.
+  };
+
+  // Throws std::runtime_error naming the file and what to do: no such file (kRead), not SQLite, not a Vantage store, a newer
+  // schema.
+  Store(const std::filesystem::path& file, Mode mode);
+  ~Store();
+  Store(Store&&) noexcept;
+  Store& operator=(Store&&) noexcept;
+
+  std::vector<Summary> List() const;  // By name.
+  // nullopt where there is no such object. Throws std::runtime_error where stored data is damaged, naming the object and view.
+  std::optional<ObjectModel> Load(const std::string& name) const;
+
+  // Every call is one transaction: durable when it returns (WAL, synchronous FULL), or nothing is changed. Throw std::runtime_error
+  // (disk full, read-only, locked longer than 5 s).
+  void SaveObject(const ObjectModel& model);         // Replaces the whole object.
+  void AddView(const ObjectModel& model, int view);  // Appends that view, the points it added, and moves what refinement moved.
+  void SaveMeasures(const std::string& name, const measures::Measures& measures, double completeness);
+  void Remove(const std::string& name);
+
+  std::optional<double> Completeness(const std::string& name) const;  // As last saved with the measures.
+  const std::filesystem::path& file() const { return file_; }
+
+ private:
+  struct Impl;
+  std::filesystem::path file_;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vantage::model

@@ -1,0 +1,37 @@
+// Timed camera motion.
+#pragma once
+
+#include <vector>
+
+#include "geometry/rigid.h"
+
+namespace vantage::motion {
+
+struct SpeedLimits {
+  double max_speed_m_s = 0.25;                // > 0.
+  double max_acceleration_m_s2 = 0.5;         // > 0.
+  double max_turn_rate_rad_s = 0.8;           // > 0.
+  double max_turn_acceleration_rad_s2 = 1.6;  // > 0.
+
+  void Check() const;  // Throws std::invalid_argument naming the field.
+};
+
+struct Waypoint {
+  double time_s = 0.0;  // Since the start; ascending.
+  geometry::Rigid T_world_mount = geometry::Rigid::Identity();
+};
+
+struct Trajectory {
+  std::vector<Waypoint> waypoints;
+
+  double duration_s() const { return waypoints.empty() ? 0.0 : waypoints.back().time_s; }
+  // The pose at a time; clamped to the ends. Throws std::logic_error where there are no waypoints.
+  geometry::Rigid At(double time_s) const;
+};
+
+// Times a polyline of poses: the mount starts and ends at rest and keeps the limits, along the whole path (translation and rotation
+// together: the slower decides). Waypoints are dense enough (<= 50 ms) that straight interpolation between them keeps the limits
+// within 2 %. Corners are passed without stopping, slowed so that the direction change keeps the acceleration limit.
+Trajectory TimePath(const std::vector<geometry::Rigid>& poses, const SpeedLimits& limits);
+
+}  // namespace vantage::motion

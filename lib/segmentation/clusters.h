@@ -1,0 +1,41 @@
+// Objects standing on the table: connected components of the organised cloud above the plane.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "segmentation/plane.h"
+
+namespace vantage::segmentation {
+
+struct ClusterParams {
+  double min_height_m = 0.012;  // Above the plane; > 0.
+  double max_height_m = 0.6;    // > min_height_m.
+  double max_jump_m =
+      0.015;  // Neighbouring pixels further apart in depth belong to different objects, at 1 m; grows with depth squared; > 0.
+  int bridge_px = 3;         // Holes up to this wide do not part an object; >= 1.
+  double min_size_m = 0.02;  // Smaller (longest side) clusters are not objects; > 0.
+  double max_size_m = 0.6;   // > min_size_m.
+  int min_pixels = 300;      // >= 1.
+
+  void Check() const;
+};
+
+struct Cluster {
+  cv::Mat mask;              // CV_8UC1, 255 on the object, holes closed; size of the frame.
+  cv::Rect box;              // Bounding box of the mask.
+  int pixels = 0;            // With depth.
+  Eigen::Vector3d centroid;  // Camera coordinates, metres.
+  bool touches_border = false;
+};
+
+// Clusters by falling number of pixels. Camera coordinates.
+std::vector<Cluster> FindClusters(const rgbd::Frame& frame, const Plane& plane, const ClusterParams& params);
+
+// The cluster that holds the pixel (or whose mask is nearest, within 20 px); -1 where there is none.
+int ClusterAt(const std::vector<Cluster>& clusters, const Eigen::Vector2d& pixel);
+
+// The cluster whose mask is nearest to the image centre; -1 where there is none.
+int ClusterNearestCentre(const std::vector<Cluster>& clusters);
+
+}  // namespace vantage::segmentation

@@ -1,0 +1,34 @@
+// Dominant-plane estimation: finds the table so that objects can be cut out.
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "rgbd/frame.h"
+
+namespace vantage::segmentation {
+
+struct PlaneParams {
+  double max_distance_m = 0.01;  // Inlier band around the plane; > 0.
+  double confidence = 0.99;      // P(one sample is all inliers); in (0, 1).
+  int max_iterations = 500;      // Cap on RANSAC samples; >= 1.
+  int step_px = 4;               // Only every n-th pixel is used; >= 1.
+  double min_share = 0.15;       // A plane with a smaller share of the points is no table; (0, 1].
+  double max_depth_m = 2.5;      // Points further away are not used; > 0.
+
+  void Check() const;  // Throws std::invalid_argument naming the first field out of range.
+};
+
+struct Plane {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // Unit length; points to the side of the camera.
+  double offset_m = 0.0;                              // normal.dot(x) + offset_m == 0 on the plane; height above it elsewhere.
+  double share = 0.0;                                 // Of the points used.
+  double Height(const Eigen::Vector3d& x) const { return normal.dot(x) + offset_m; }
+};
+
+// The plane that most points support (RANSAC; PCL), refined on its inliers. Camera coordinates. nullopt where there is none with
+// `min_share`, or the frame has no depth.
+std::optional<Plane> FitPlane(const rgbd::Frame& frame, const PlaneParams& params);
+
+}  // namespace vantage::segmentation
