@@ -28,13 +28,15 @@ struct Gaussian {
 class ObservedSuccess {
  public:
   ObservedSuccess();  // The shipped default.
+  // Throws std::invalid_argument where a sigma is not > 0 or a mean not finite.
   ObservedSuccess(const Gaussian& positive, const Gaussian& negative, Source source);
 
   // Fits both Gaussians. Each is drawn towards the default's as if `prior_count` samples of the default had been seen too, so that
   // few samples are never sure. With no samples: the default.
   static ObservedSuccess Fit(const std::vector<ConfidenceSample>& samples, Source source, double prior_count = 10.0);
 
-  // p(o|c) with prior p(o) in (0, 1); non-decreasing in c. Equation (10); prior 1/2 is the paper's.
+  // p(o|c) with prior p(o) in (0, 1); non-decreasing in c. Equation (10); prior 1/2 is the paper's. Where the positive mean is not
+  // above the negative one, c tells nothing and the prior comes back.
   double Probability(double confidence, double prior = 0.5) const;
 
   const Gaussian& positive() const { return positive_; }

@@ -29,6 +29,7 @@ class PredictedSuccess {
   static PredictedSuccess Fit(const std::vector<PredictionSample>& samples, Source source, double prior_count = 4.0);
 
   // p(o|theta, s), bilinear between cell centres, non-increasing in theta; 0 from 90 degrees on (nothing learned is in view).
+  // Beyond the grid of scales, where nothing was tried, it falls linearly to 0 at two octaves.
   double Probability(double rotation_rad, double log2_scale = 0.0) const;
 
   // Rotation at which the probability at learned scale falls to one half, radians.
@@ -36,7 +37,8 @@ class PredictedSuccess {
 
   Source source() const { return source_; }
   int trials() const;
-  // Counts per cell, index rotation_cell * kScaleCells + scale_cell.
+  double prior_count() const { return prior_count_; }
+  // Counts per cell, index rotation_cell * kScaleCells + scale_cell. A trial between cell centres counts for each in part.
   const std::vector<double>& trial_counts() const { return trials_; }
   const std::vector<double>& success_counts() const { return successes_; }
   // From stored counts (both kRotationCells * kScaleCells long, 0 <= success <= trial). Throws std::invalid_argument.
@@ -44,9 +46,12 @@ class PredictedSuccess {
                                      double prior_count = 4.0);
 
  private:
+  PredictedSuccess(std::vector<double> trials, std::vector<double> successes, Source source, double prior_count);
+
   std::vector<double> trials_;
   std::vector<double> successes_;
   std::vector<double> table_;  // Smoothed and monotone probability per cell.
+  double prior_count_ = 4.0;
   Source source_ = Source::kDefault;
 };
 

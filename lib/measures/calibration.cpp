@@ -1,0 +1,45 @@
+#include "measures/calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace vantage::measures {
+
+double BrierScore(const std::vector<Forecast>& forecasts) {
+  if (forecasts.empty()) return 0.0;
+  double sum = 0.0;
+  for (const Forecast& forecast : forecasts) sum += std::pow(forecast.probability - (forecast.outcome ? 1.0 : 0.0), 2);
+  return sum / static_cast<double>(forecasts.size());
+}
+
+std::vector<ReliabilityBin> Reliability(std::vector<Forecast> forecasts, int bins) {
+  if (bins < 1) throw std::invalid_argument("Reliability: bins must be >= 1");
+  std::sort(forecasts.begin(), forecasts.end(), [](const Forecast& a, const Forecast& b) { return a.probability < b.probability; });
+  std::vector<ReliabilityBin> table;
+  std::size_t begin = 0;
+  for (int bin = 1; bin <= bins; ++bin) {
+    std::size_t end = forecasts.size() * static_cast<std::size_t>(bin) / static_cast<std::size_t>(bins);
+    if (end <= begin) continue;
+    while (end < forecasts.size() && forecasts[end].probability == forecasts[end - 1].probability) ++end;
+    ReliabilityBin entry;
+    entry.count = static_cast<int>(end - begin);
+    for (std::size_t i = begin; i < end; ++i) {
+      entry.mean_probability += forecasts[i].probability / entry.count;
+      entry.frequency += (forecasts[i].outcome ? 1.0 : 0.0) / entry.count;
+    }
+    table.push_back(entry);
+    begin = end;
+  }
+  return table;
+}
+
+double CalibrationError(const std::vector<Forecast>& forecasts, int bins) {
+  double error = 0.0;
+  for (const ReliabilityBin& bin : Reliability(forecasts, bins)) {
+    error += bin.count * std::abs(bin.mean_probability - bin.frequency) / static_cast<double>(forecasts.size());
+  }
+  return error;
+}
+
+}  // namespace vantage::measures

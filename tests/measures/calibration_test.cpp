@@ -1,0 +1,62 @@
+#include "measures/calibration.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+namespace vantage::measures {
+namespace {
+
+TEST(Calibration, BrierScoreOfKnownForecasts) {
+  EXPECT_EQ(BrierScore({}), 0.0);
+  EXPECT_NEAR(BrierScore({{1.0, true}, {0.0, false}}), 0.0, 1e-12);
+  EXPECT_NEAR(BrierScore({{0.5, true}, {0.5, false}}), 0.25, 1e-12);
+  EXPECT_NEAR(BrierScore({{0.8, true}, {0.8, false}}), (0.04 + 0.64) / 2, 1e-12);
+}
+
+TEST(Calibration, HonestForecastsHaveNoErrorAndOverconfidentOnesDo) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  std::vector<Forecast> honest, overconfident;
+  for (int i = 0; i < 20000; ++i) {
+    const double p = uniform(random);
+    const bool outcome = uniform(random) < p;
+    honest.push_back({p, outcome});
+    overconfident.push_back({p < 0.5 ? 0.2 * p : 1.0 - 0.2 * (1.0 - p), outcome});
+  }
+  EXPECT_LT(CalibrationError(honest), 0.02);
+  EXPECT_GT(CalibrationError(overconfident), 0.15);
+  EXPECT_LT(BrierScore(honest), BrierScore(overconfident));
+}
+
+TEST(Calibration, BinsHoldEqualMassAndNeverPartEqualProbabilities) {
+  std::vector<Forecast> forecasts;
+  for (int i = 0; i < 100; ++i) forecasts.push_back({std::pow(i / 100.0, 3), i % 3 == 0});
+  for (const ReliabilityBin& bin : Reliability(forecasts, 10)) EXPECT_EQ(bin.count, 10);
+
+  // Ten of one kind: one bin, whatever the order they come in.
+  std::vector<Forecast> ties(10, {0.7, false});
+  for (int i = 0; i < 7; ++i) ties[i].outcome = true;
+  const auto table = Reliability(ties, 5);
+  ASSERT_EQ(table.size(), 1u);
+  EXPECT_EQ(table[0].count, 10);
+  EXPECT_NEAR(table[0].frequency, 0.7, 1e-12);
+  EXPECT_NEAR(CalibrationError(ties, 5), 0.0, 1e-12);
+}
+
+TEST(Calibration, EveryForecastIsInOneBin) {
+  for (int n : {1, 3, 9, 10, 11, 57}) {
+    std::vector<Forecast> forecasts;
+    for (int i = 0; i < n; ++i) forecasts.push_back({(i * 7 % n) / double(n), i % 2 == 0});
+    int total = 0;
+    for (const ReliabilityBin& bin : Reliability(forecasts, 10)) total += bin.count;
+    EXPECT_EQ(total, n);
+  }
+  EXPECT_TRUE(Reliability({}).empty());
+  EXPECT_THROW(Reliability({{0.5, true}}, 0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace vantage::measures
