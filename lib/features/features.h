@@ -11,7 +11,6 @@ struct FeatureParams {
   std::string type = "sift";         // "sift" (OpenCV, square-rooted to RootSIFT).
   int max_keypoints = 3000;          // Strongest kept per image; >= 1.
   double contrast_threshold = 0.02;  // SIFT's; lower finds more and weaker points; > 0.
-  bool upsample = true;              // Start at the doubled image: more small points, four times the work.
 
   void Check() const;               // Throws std::invalid_argument naming the field.
   std::string Fingerprint() const;  // Equal where descriptors and repeatability are comparable.
@@ -46,7 +45,10 @@ struct NearestPair {
   float best_distance = 2.f;
   float second_distance = 2.f;
 };
-std::vector<NearestPair> NearestTwo(const cv::Mat& query, const cv::Mat& train, const std::vector<int>& exclusion = {});
+// The nearest train rows of every query row (both CV_32F, unit rows of equal length, a multiple of 8). `groups` (one int per train
+// row, may be empty): the second best is sought outside the group of the best, so that views of one physical point do not compete.
+// Exhaustive: about 0.1 s for 1500 x 10000 rows of 128.
+std::vector<NearestPair> NearestTwo(const cv::Mat& query, const cv::Mat& train, const std::vector<int>& groups = {});
 
 // Matches whose best distance is below `max_ratio` times the second best and below `max_distance`.
 std::vector<Match> MatchRatio(const cv::Mat& query, const cv::Mat& train, double max_ratio, double max_distance = 1.2);

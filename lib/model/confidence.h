@@ -9,7 +9,7 @@
 namespace vantage::model {
 
 struct ConfidenceParams {
-  double support_px = 4.0;  // t_int: an interest point this near supports a projected model point; > 0, at 640 px focal length...
+  double support_px = 4.0;          // t_int: an interest point this near supports a projected model point; > 0.
   double max_incidence_deg = 80.0;  // A point is visible where line of sight and normal differ by less; (0, 90].
   double occlusion_m = 0.03;        // Measured depth this much in front of a point hides it (where there is depth); > 0.
   int min_points = 8;               // A view with fewer visible model points says nothing: c_ij = 0; >= 1.
@@ -46,6 +46,9 @@ struct Confidence {
 // c_ij of one view. `frame` gives camera and, where present, depth.
 Confidence ViewConfidence(const ObjectModel& model, int view, const geometry::Rigid& T_camera_object, const rgbd::Frame& frame,
                           const KeypointGrid& keypoints, const ConfidenceParams& params);
+
+// Indices of the `count` views whose directions are nearest to the pose's, nearest first.
+std::vector<int> NearestViews(const ObjectModel& model, const geometry::Rigid& T_camera_object, int count);
 
 // c_i = max_j c_ij over the views nearest in direction.
 Confidence ObjectConfidence(const ObjectModel& model, const geometry::Rigid& T_camera_object, const rgbd::Frame& frame,

@@ -15,7 +15,9 @@ namespace vantage::recognition {
 struct RecogniserParams {
   features::FeatureParams features;
   model::ConfidenceParams confidence;
-  double max_ratio = 0.85;  // Best over second-best descriptor distance; (0, 1].
+  double max_ratio = 0.85;      // Best over second-best descriptor distance; (0, 1].
+  double vote_bandwidth = 0.5;  // Of the mean shift, in radii of the object; > 0.
+  int max_clusters = 6;         // Vote clusters (heaviest first) that get a pose hypothesis; >= 1.
   pose::RansacParams ransac;
   int min_inliers = 7;                // Fewer supporting matches are no hypothesis; >= 4.
   double guided_radius_px = 8.0;      // Second round: model points look for their feature this near their projection; > 0.

@@ -1,0 +1,106 @@
+#include "model/confidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+namespace vantage::model {
+namespace {
+
+// Projected pixel of a model point where it can be seen from this pose; nullopt where it faces away, lies outside the image or is
+// hidden by something nearer.
+std::optional<Eigen::Vector2d> VisiblePixel(const ModelPoint& point, const geometry::Rigid& T_camera_object,
+                                            const rgbd::Frame& frame, const ConfidenceParams& params) {
+  const Eigen::Vector3d in_camera = T_camera_object * point.position;
+  const Eigen::Vector3d normal = T_camera_object.linear() * point.normal;
+  if (-normal.dot(in_camera.normalized()) < std::cos(params.max_incidence_deg * M_PI / 180.0)) return std::nullopt;
+  const auto pixel = frame.camera.Project(in_camera);
+  if (!pixel || !frame.camera.Contains(*pixel)) return std::nullopt;
+  const auto depth = rgbd::DepthAt(frame, *pixel, 0);
+  if (depth && *depth < in_camera.z() - params.occlusion_m) return std::nullopt;
+  return pixel;
+}
+
+}  // namespace
+
+void ConfidenceParams::Check() const {
+  const auto require = [](bool ok, const char* what) {
+    if (!ok) throw std::invalid_argument(std::string("confidence: ") + what);
+  };
+  require(support_px > 0.0, "support_px must be > 0");
+  require(max_incidence_deg > 0.0 && max_incidence_deg <= 90.0, "max_incidence_deg must be in (0, 90]");
+  require(occlusion_m > 0.0, "occlusion_m must be > 0");
+  require(min_points >= 1, "min_points must be >= 1");
+  require(max_views >= 1, "max_views must be >= 1");
+}
+
+std::string ConfidenceParams::Fingerprint() const {
+  return std::to_string(support_px) + ":" + std::to_string(max_incidence_deg) + ":" + std::to_string(min_points);
+}
+
+KeypointGrid::KeypointGrid(const std::vector<cv::KeyPoint>& keypoints, int width, int height, double cell_px)
+    : columns_(static_cast<int>(width / cell_px) + 1), rows_(static_cast<int>(height / cell_px) + 1), cell_px_(cell_px) {
+  cells_.resize(static_cast<size_t>(columns_) * rows_);
+  for (const cv::KeyPoint& keypoint : keypoints) {
+    const int column = std::clamp(static_cast<int>(keypoint.pt.x / cell_px_), 0, columns_ - 1);
+    const int row = std::clamp(static_cast<int>(keypoint.pt.y / cell_px_), 0, rows_ - 1);
+    cells_[row * columns_ + column].push_back(static_cast<int>(points_.size()));
+    points_.push_back(keypoint.pt);
+  }
+}
+
+std::vector<int> KeypointGrid::Near(const Eigen::Vector2d& pixel, double radius_px) const {
+  std::vector<int> near;
+  const auto cell = [this](double value, int limit) {
+    return std::clamp(static_cast<int>(std::floor(value / cell_px_)), 0, limit);
+  };
+  for (int row = cell(pixel.y() - radius_px, rows_ - 1); row <= cell(pixel.y() + radius_px, rows_ - 1); ++row) {
+    for (int column = cell(pixel.x() - radius_px, columns_ - 1); column <= cell(pixel.x() + radius_px, columns_ - 1); ++column) {
+      for (const int i : cells_[row * columns_ + column]) {
+        if (std::hypot(points_[i].x - pixel.x(), points_[i].y - pixel.y()) <= radius_px) near.push_back(i);
+      }
+    }
+  }
+  return near;
+}
+
+bool KeypointGrid::HasNear(const Eigen::Vector2d& pixel, double radius_px) const { return !Near(pixel, radius_px).empty(); }
+
+Confidence ViewConfidence(const ObjectModel& model, int view, const geometry::Rigid& T_camera_object, const rgbd::Frame& frame,
+                          const KeypointGrid& keypoints, const ConfidenceParams& params) {
+  Confidence confidence;
+  confidence.view = view;
+  for (const int index : model.views[view].points) {
+    const auto pixel = VisiblePixel(model.points[index], T_camera_object, frame, params);
+    if (!pixel) continue;
+    ++confidence.visible;
+    confidence.support += keypoints.HasNear(*pixel, params.support_px);
+  }
+  if (confidence.visible >= params.min_points) confidence.value = double(confidence.support) / confidence.visible;  // Equation (1)
+  return confidence;
+}
+
+std::vector<int> NearestViews(const ObjectModel& model, const geometry::Rigid& T_camera_object, int count) {
+  const Eigen::Vector3d direction = geometry::ViewDirection(T_camera_object);
+  std::vector<double> angles;
+  for (const View& view : model.views) angles.push_back(geometry::AngleBetween(direction, view.viewpoint().direction));
+  std::vector<int> order(model.views.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return angles[a] < angles[b]; });
+  if (static_cast<int>(order.size()) > count) order.resize(count);
+  return order;
+}
+
+Confidence ObjectConfidence(const ObjectModel& model, const geometry::Rigid& T_camera_object, const rgbd::Frame& frame,
+                            const KeypointGrid& keypoints, const ConfidenceParams& params) {
+  Confidence best;
+  for (const int view : NearestViews(model, T_camera_object, params.max_views)) {
+    const Confidence confidence = ViewConfidence(model, view, T_camera_object, frame, keypoints, params);
+    if (confidence.value > best.value) best = confidence;  // Equation (2)
+  }
+  return best;
+}
+
+}  // namespace vantage::model

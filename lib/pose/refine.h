@@ -1,0 +1,21 @@
+// Non-linear refinement of one camera pose on 2D-3D matches.
+#pragma once
+
+#include <vector>
+
+#include "geometry/camera.h"
+#include "geometry/rigid.h"
+#include "pose/ransac.h"
+
+namespace vantage::pose {
+
+// Reprojection error of a match, pixels; +inf behind the camera.
+double ReprojectionError(const Match2d3d& match, const geometry::PinholeCamera& camera, const geometry::Rigid& T_camera_object);
+
+// Minimises the Cauchy-weighted reprojection error of the matches `index` by Gauss-Newton. `scale_px` is the error at which a match
+// weighs half. Returns the start where fewer than 3 matches are usable. Cost: about 10 us an iteration at 100 matches.
+geometry::Rigid RefinePose(const std::vector<Match2d3d>& matches, const std::vector<int>& index,
+                           const geometry::PinholeCamera& camera, const geometry::Rigid& T_camera_object, double scale_px,
+                           int iterations = 10);
+
+}  // namespace vantage::pose

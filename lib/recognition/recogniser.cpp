@@ -1,0 +1,232 @@
+#include "recognition/recogniser.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+
+#include "recognition/guided.h"
+#include "recognition/voting.h"
+
+namespace vantage::recognition {
+namespace {
+
+constexpr double kGroupRadius = 0.008;  // Model points this near (metres) are one place on the object to the ratio test.
+
+// Numbers the places: points nearer than kGroupRadius to a place's first point belong to it.
+std::vector<int> GroupPoints(const std::vector<model::ModelPoint>& points) {
+  std::map<std::array<int, 3>, std::vector<int>> cells;
+  std::vector<int> group(points.size());
+  const auto cell_of = [](const Eigen::Vector3d& p, int axis) { return static_cast<int>(std::floor(p[axis] / kGroupRadius)); };
+  for (size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d& p = points[i].position;
+    int found = -1;
+    for (int n = 0; n < 27 && found < 0; ++n) {
+      const auto cell = cells.find({cell_of(p, 0) + n % 3 - 1, cell_of(p, 1) + n / 3 % 3 - 1, cell_of(p, 2) + n / 9 - 1});
+      if (cell == cells.end()) continue;
+      for (const int leader : cell->second) {
+        if ((points[leader].position - p).norm() < kGroupRadius) found = leader;
+      }
+    }
+    if (found < 0) {
+      found = static_cast<int>(i);
+      cells[{cell_of(p, 0), cell_of(p, 1), cell_of(p, 2)}].push_back(found);
+    }
+    group[i] = found;
+  }
+  return group;
+}
+
+// One interest point of a stored view.
+struct Entry {
+  int view;
+  int keypoint;
+  int point;
+};
+
+// An object made ready for matching.
+struct Known {
+  std::shared_ptr<const model::ObjectModel> object;
+  cv::Mat descriptors;                        // Of all views, stacked.
+  std::vector<Entry> entries;                 // One per row.
+  std::vector<int> groups;                    // One per row.
+  std::vector<Eigen::Vector2d> centre_pixel;  // Of the object, per view.
+  std::vector<double> radius_px;              // Of the object, per view.
+};
+
+Known Prepare(std::shared_ptr<const model::ObjectModel> object) {
+  Known known;
+  known.object = object;
+  Eigen::Vector3d lower = Eigen::Vector3d::Constant(1e9), upper = -lower;
+  for (const model::ModelPoint& point : object->points) {
+    lower = lower.cwiseMin(point.position);
+    upper = upper.cwiseMax(point.position);
+  }
+  const Eigen::Vector3d centre = 0.5 * (lower + upper);
+  const double radius_m = std::max(0.01, 0.5 * (upper - lower).norm());
+  const std::vector<int> group = GroupPoints(object->points);
+  for (size_t v = 0; v < object->views.size(); ++v) {
+    const model::View& view = object->views[v];
+    const Eigen::Vector3d centre_in_camera = view.T_camera_object * centre;
+    known.centre_pixel.push_back(view.keyframe.camera.Project(centre_in_camera).value_or(Eigen::Vector2d::Zero()));
+    known.radius_px.push_back(view.keyframe.camera.fx * radius_m / std::max(0.05, centre_in_camera.z()));
+    for (int k = 0; k < view.features.size(); ++k) {
+      known.entries.push_back({static_cast<int>(v), k, view.points[k]});
+      known.groups.push_back(group[view.points[k]]);
+    }
+    known.descriptors.push_back(view.features.descriptors);
+  }
+  return known;
+}
+
+// A tentative match: a keypoint of the frame and a row of the object.
+struct Tentative {
+  int keypoint;
+  int row;
+};
+
+}  // namespace
+
+void RecogniserParams::Check() const {
+  features.Check();
+  confidence.Check();
+  ransac.Check();
+  const auto require = [](bool ok, const char* what) {
+    if (!ok) throw std::invalid_argument(std::string("recogniser: ") + what);
+  };
+  require(max_ratio > 0.0 && max_ratio <= 1.0, "max_ratio must be in (0, 1]");
+  require(max_clusters >= 1, "max_clusters must be >= 1");
+  require(vote_bandwidth > 0.0, "vote_bandwidth must be > 0");
+  require(min_inliers >= 4, "min_inliers must be >= 4");
+  require(guided_radius_px > 0.0, "guided_radius_px must be > 0");
+  require(guided_max_distance > 0.0 && guided_max_distance <= 2.0, "guided_max_distance must be in (0, 2]");
+  require(min_probability >= 0.0 && min_probability <= 1.0, "min_probability must be in [0, 1]");
+}
+
+std::string RecogniserParams::Fingerprint() const {
+  return features.Fingerprint() + "|" + confidence.Fingerprint() + "|" + std::to_string(max_ratio) + ":" +
+         std::to_string(min_inliers) + ":" + std::to_string(ransac.inlier_px);
+}
+
+struct Recogniser::Impl {
+  RecogniserParams params;
+  std::map<std::string, Known> objects;
+
+  std::vector<Tentative> Match(const Known& known, const features::Features& features) const {
+    std::vector<Tentative> matches;
+    const auto nearest = features::NearestTwo(features.descriptors, known.descriptors, known.groups);
+    for (size_t i = 0; i < nearest.size(); ++i) {
+      if (nearest[i].best >= 0 && nearest[i].best_distance < params.max_ratio * nearest[i].second_distance) {
+        matches.push_back({static_cast<int>(i), nearest[i].best});
+      }
+    }
+    return matches;
+  }
+
+  std::vector<VoteCluster> Vote(const Known& known, const features::Features& features,
+                                const std::vector<Tentative>& matches) const {
+    std::vector<recognition::Vote> votes;
+    for (const Tentative& match : matches) {
+      const Entry& entry = known.entries[match.row];
+      const cv::KeyPoint& keypoint = known.object->views[entry.view].features.keypoints[entry.keypoint];
+      const Eigen::Vector2d to_centre = known.centre_pixel[entry.view] - Eigen::Vector2d(keypoint.pt.x, keypoint.pt.y);
+      votes.push_back(CastVote(features.keypoints[match.keypoint], keypoint, to_centre, known.radius_px[entry.view]));
+    }
+    std::vector<VoteCluster> clusters = MeanShift(votes, params.vote_bandwidth);
+    if (static_cast<int>(clusters.size()) > params.max_clusters) clusters.resize(params.max_clusters);
+    return clusters;
+  }
+
+  std::optional<Detection> Verify(const Known& known, const rgbd::Frame& frame, const features::Features& features,
+                                  const model::KeypointGrid& grid, const geometry::Rigid& T_camera_object) const {
+    const GuidedParams guided_params{params.guided_radius_px, params.guided_max_distance, params.ransac.inlier_px, 4};
+    const GuidedPose guided = MatchGuided(*known.object, T_camera_object, frame.camera, features, grid, guided_params);
+    if (static_cast<int>(guided.matches.size()) < params.min_inliers) return std::nullopt;
+    Detection detection;
+    detection.object = known.object->name;
+    detection.T_camera_object = guided.T_camera_object;
+    detection.inliers = static_cast<int>(guided.matches.size());
+    int measured = 0, supported = 0;
+    for (const GuidedMatch& match : guided.matches) {
+      const cv::Point2f& pixel = features.keypoints[match.keypoint].pt;
+      detection.inlier_pixels.emplace_back(pixel.x, pixel.y);
+      if (!params.use_query_depth) continue;
+      if (const auto depth = rgbd::DepthAt(frame, detection.inlier_pixels.back())) {
+        ++measured;
+        const double z = (guided.T_camera_object * known.object->points[match.point].position).z();
+        supported += std::abs(z - *depth) < params.ransac.max_depth_error_m;
+      }
+    }
+    if (supported < params.ransac.min_depth_support * measured) return std::nullopt;
+    detection.confidence = model::ObjectConfidence(*known.object, detection.T_camera_object, frame, grid, params.confidence);
+    return detection;
+  }
+
+  std::optional<Detection> Find(const Known& known, const rgbd::Frame& frame, const features::Features& features,
+                                const model::KeypointGrid& grid) const {
+    const std::vector<Tentative> matches = Match(known, features);
+    std::optional<Detection> best;
+    for (const VoteCluster& cluster : Vote(known, features, matches)) {
+      std::vector<pose::Match2d3d> points;
+      for (const int vote : cluster.votes) {
+        const cv::Point2f& pixel = features.keypoints[matches[vote].keypoint].pt;
+        points.push_back({{pixel.x, pixel.y}, known.object->points[known.entries[matches[vote].row].point].position});
+      }
+      const auto estimate =
+          pose::EstimatePose(points, frame.camera, params.use_query_depth ? &frame : nullptr, params.ransac, params.seed);
+      if (!estimate) continue;
+      const auto detection = Verify(known, frame, features, grid, estimate->T_camera_object);
+      if (detection && (!best || detection->inliers > best->inliers)) best = detection;
+    }
+    return best;
+  }
+};
+
+Recogniser::Recogniser(const RecogniserParams& params) : params_(params), impl_(std::make_unique<Impl>()) {
+  params.Check();
+  impl_->params = params;
+}
+Recogniser::~Recogniser() = default;
+Recogniser::Recogniser(Recogniser&&) noexcept = default;
+Recogniser& Recogniser::operator=(Recogniser&&) noexcept = default;
+
+void Recogniser::Set(std::shared_ptr<const model::ObjectModel> object) {
+  if (object->feature_fingerprint != params_.features.Fingerprint()) {
+    throw std::invalid_argument("object " + object->name + " was learned with features " + object->feature_fingerprint +
+                                ", the recogniser uses " + params_.features.Fingerprint() +
+                                "; learn it again or change the features");
+  }
+  impl_->objects[object->name] = Prepare(object);
+}
+
+void Recogniser::Remove(const std::string& name) { impl_->objects.erase(name); }
+
+int Recogniser::size() const { return static_cast<int>(impl_->objects.size()); }
+
+features::Features Recogniser::Extract(const rgbd::Frame& frame) const {
+  return features::Extract(rgbd::Gray(frame), cv::Mat(), params_.features);
+}
+
+std::vector<Detection> Recogniser::Recognise(const rgbd::Frame& frame, const features::Features& features,
+                                             const std::vector<std::pair<std::string, double>>& priors) const {
+  rgbd::Frame query = frame;
+  if (!params_.use_query_depth) query.depth = cv::Mat();
+  const model::KeypointGrid grid(features.keypoints, frame.camera.width, frame.camera.height);
+  std::vector<Detection> detections;
+  for (const auto& [name, known] : impl_->objects) {
+    auto detection = impl_->Find(known, query, features, grid);
+    if (!detection) continue;
+    double prior = 0.5;
+    for (const auto& [object, value] : priors) {
+      if (object == name) prior = value;
+    }
+    detection->probability = known.object->measures.observed.Probability(detection->confidence.value, prior);
+    detection->source = known.object->measures.observed.source();
+    if (detection->probability >= params_.min_probability) detections.push_back(std::move(*detection));
+  }
+  std::stable_sort(detections.begin(), detections.end(),
+                   [](const auto& a, const auto& b) { return a.probability > b.probability; });
+  return detections;
+}
+
+}  // namespace vantage::recognition

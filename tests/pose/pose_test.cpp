@@ -1,0 +1,139 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "pose/p3p.h"
+#include "pose/ransac.h"
+#include "pose/refine.h"
+
+namespace vantage::pose {
+namespace {
+
+const geometry::PinholeCamera kCamera{640, 480, 525, 525, 319.5, 239.5};
+
+class Truth {
+ public:
+  explicit Truth(std::uint32_t seed) : random_(seed) {}
+  double Uniform(double low, double high) { return low + (high - low) * (random_() / 4294967296.0); }
+  double Normal() { return std::sqrt(-2.0 * std::log(Uniform(1e-12, 1.0))) * std::cos(Uniform(0.0, 2.0 * M_PI)); }
+  Eigen::Vector3d Point(double size) { return {Uniform(-size, size), Uniform(-size, size), Uniform(-size, size)}; }
+  geometry::Rigid Pose() {
+    geometry::Rigid T = geometry::Rigid::Identity();
+    T.linear() = Eigen::Quaterniond(Normal(), Normal(), Normal(), Normal()).normalized().toRotationMatrix();
+    T.translation() = Eigen::Vector3d(Uniform(-0.1, 0.1), Uniform(-0.1, 0.1), Uniform(0.5, 0.9));
+    return T;
+  }
+  // `count` matches of which a share are right, with `noise_px`; the right ones first.
+  std::vector<Match2d3d> Matches(const geometry::Rigid& T, int count, double inlier_share, double noise_px) {
+    std::vector<Match2d3d> matches;
+    for (int i = 0; i < count; ++i) {
+      const Eigen::Vector3d point = Point(0.1);
+      Eigen::Vector2d pixel = *kCamera.Project(T * point) + noise_px * Eigen::Vector2d(Normal(), Normal());
+      if (i >= inlier_share * count) pixel = {Uniform(0, 640), Uniform(0, 480)};
+      matches.push_back({pixel, point});
+    }
+    return matches;
+  }
+
+ private:
+  std::mt19937 random_;
+};
+
+TEST(Quartic, FindsTheRootsOfKnownPolynomials) {
+  std::array<double, 4> roots;
+  ASSERT_EQ(SolveQuartic(-10, 35, -50, 24, &roots), 4);  // (x-1)(x-2)(x-3)(x-4)
+  std::sort(roots.begin(), roots.end());
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(roots[i], i + 1, 1e-9);
+  EXPECT_EQ(SolveQuartic(0, 0, 0, 1, &roots), 0);   // x^4 = -1
+  ASSERT_EQ(SolveQuartic(0, -5, 0, 4, &roots), 4);  // Biquadratic: +-1, +-2
+}
+
+TEST(P3p, OneOfTheSolutionsIsTheTruth) {
+  Truth truth(1);
+  int found = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    const geometry::Rigid T = truth.Pose();
+    Eigen::Matrix3d points, rays;
+    for (int k = 0; k < 3; ++k) {
+      points.col(k) = truth.Point(0.1);
+      rays.col(k) = (T * Eigen::Vector3d(points.col(k))).normalized();
+    }
+    const P3pSolutions solutions = SolveP3p(rays, points);
+    bool hit = false;
+    for (int s = 0; s < solutions.count; ++s) hit |= geometry::Difference(solutions.T_camera_object[s], T).translation_m < 1e-5;
+    found += hit;
+  }
+  EXPECT_GE(found, 995);
+}
+
+TEST(P3p, CollinearPointsHaveNoPose) {
+  Eigen::Matrix3d points;
+  points << 0, 1, 2, 0, 1, 2, 0, 1, 2;
+  EXPECT_EQ(SolveP3p(Eigen::Matrix3d::Identity(), points).count, 0);
+}
+
+TEST(Ransac, FindsThePoseAmongOutliers) {
+  for (const double share : {0.5, 0.3, 0.15}) {
+    int right = 0;
+    for (std::uint32_t seed = 0; seed < 20; ++seed) {
+      Truth truth(seed);
+      const geometry::Rigid T = truth.Pose();
+      const auto matches = truth.Matches(T, 200, share, 1.0);
+      const auto estimate = EstimatePose(matches, kCamera, nullptr, RansacParams{}, seed);
+      right += estimate && geometry::Difference(estimate->T_camera_object, T).translation_m < 0.02;
+    }
+    EXPECT_GE(right, 19) << "share of inliers " << share;
+  }
+}
+
+TEST(Ransac, IsTheSameForTheSameSeed) {
+  Truth truth(7);
+  const auto matches = truth.Matches(truth.Pose(), 100, 0.4, 1.0);
+  const auto a = EstimatePose(matches, kCamera, nullptr, RansacParams{}, 3);
+  const auto b = EstimatePose(matches, kCamera, nullptr, RansacParams{}, 3);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->T_camera_object.matrix(), b->T_camera_object.matrix());
+  EXPECT_EQ(a->inliers, b->inliers);
+}
+
+TEST(Ransac, TheDepthImagePrunesPosesInFrontOfAndBehindTheSurface) {
+  Truth truth(5);
+  geometry::Rigid T = truth.Pose();
+  const auto matches = truth.Matches(T, 100, 1.0, 0.5);
+  rgbd::Frame frame;
+  frame.camera = kCamera;
+  for (const int wrong_mm : {-200, 200}) {
+    frame.depth = cv::Mat::zeros(480, 640, CV_16UC1);
+    for (const Match2d3d& match : matches) {
+      const int depth_mm = static_cast<int>((T * match.point).z() * 1000) + wrong_mm;
+      frame.depth(cv::Rect(match.pixel.x() - 3, match.pixel.y() - 3, 7, 7) & cv::Rect(0, 0, 640, 480)).setTo(depth_mm);
+    }
+    EXPECT_FALSE(EstimatePose(matches, kCamera, &frame, RansacParams{}, 1).has_value()) << wrong_mm;
+  }
+}
+
+TEST(Ransac, TooFewMatchesIsNoPose) {
+  Truth truth(2);
+  EXPECT_FALSE(EstimatePose(truth.Matches(truth.Pose(), 3, 1.0, 0.0), kCamera, nullptr, RansacParams{}, 0).has_value());
+  EXPECT_FALSE(EstimatePose({}, kCamera, nullptr, RansacParams{}, 0).has_value());
+  RansacParams params;
+  params.max_iterations = 10;
+  EXPECT_THROW(params.Check(), std::invalid_argument);
+}
+
+TEST(Refine, ConvergesFromNearBy) {
+  Truth truth(9);
+  const geometry::Rigid T = truth.Pose();
+  const auto matches = truth.Matches(T, 60, 1.0, 0.0);
+  std::vector<int> all(matches.size());
+  for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
+  geometry::Rigid start = T;
+  start.translation() += Eigen::Vector3d(0.01, -0.01, 0.02);
+  start.rotate(Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitX()));
+  EXPECT_LT(geometry::Difference(RefinePose(matches, all, kCamera, start, 3.0, 20), T).translation_m, 1e-6);
+}
+
+}  // namespace
+}  // namespace vantage::pose
