@@ -19,7 +19,6 @@ struct LearnerParams {
   recognition::RecogniserParams recogniser;
   double new_view_confidence = 0.6;    // A new view is added when c falls below; (0, 1).
   double min_track_probability = 0.7;  // ...but only with p(o|c) at least this; (0, 1).
-  double reference_confidence = 0.75;  // When c falls below, neighbouring views are tried as reference; (0, 1].
   int min_view_points = 20;            // A view needs so many interest points with depth; >= 4.
   double min_view_angle_deg =
       8.0;  // A new view differs from every other by so much in direction (or by half an octave in distance); >= 0.
@@ -27,7 +26,7 @@ struct LearnerParams {
       0.05;  // Where the mount's pose is known, a track that contradicts it by more is not trusted; > 0.
   double max_mount_rotation_deg = 10.0;
   bool require_mount_agreement = true;  // Use the check above where poses are known.
-  int lost_after = 5;                   // Frames without a track before relocalising by recognition; >= 1.
+  double roi_margin = 0.25;  // Interest points are sought this share of the object's size around where it is expected; >= 0.
 
   void Check() const;  // Throws std::invalid_argument naming the field.
 };
@@ -50,7 +49,6 @@ struct LearnerResult {
 // Where to start: the cluster that holds this pixel; without it, the one nearest to the image centre.
 struct Target {
   std::optional<Eigen::Vector2d> pixel;
-  cv::Mat mask;  // CV_8UC1 over the whole image: use this region instead of a cluster (ground-truth labels, tests); may be empty.
 };
 
 class Learner {
@@ -73,6 +71,7 @@ class Learner {
 
   // Table plane and clusters of the last frame that was segmented (camera coordinates of that frame).
   const std::optional<segmentation::Plane>& plane() const;
+  const std::vector<segmentation::Cluster>& clusters() const;
   // Where the object stands in the world: known once it was tracked in a frame with a known camera pose.
   std::optional<geometry::Rigid> T_world_object() const;
 

@@ -1,0 +1,104 @@
+#include "learning/keyframe.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <opencv2/imgproc.hpp>
+
+namespace vantage::learning {
+namespace {
+
+constexpr int kCropMargin = 16;  // Pixels of surroundings kept around the object.
+constexpr int kMaskInset = 2;    // Interest points nearer to the silhouette take their depth from the edge: left out.
+
+rgbd::Frame Crop(const rgbd::Frame& frame, const cv::Rect& area) {
+  rgbd::Frame crop = frame;
+  crop.color = frame.color(area).clone();
+  crop.depth = frame.depth.empty() ? cv::Mat() : frame.depth(area).clone();
+  crop.camera = frame.camera.Cropped(area.x, area.y, area.width, area.height);
+  return crop;
+}
+
+}  // namespace
+
+geometry::Rigid FirstPose(const rgbd::Frame& frame, const segmentation::Plane& plane, const segmentation::Cluster& cluster) {
+  const Eigen::Vector3d up = plane.normal;
+  Eigen::Vector3d along = Eigen::Vector3d::UnitX();
+  if (frame.T_world_camera) along = frame.T_world_camera->linear().transpose() * Eigen::Vector3d::UnitX();
+  along -= along.dot(up) * up;
+  if (along.norm() < 1e-3) along = Eigen::Vector3d::UnitY() - up.y() * up;
+  geometry::Rigid T_camera_object = geometry::Rigid::Identity();
+  T_camera_object.linear().col(0) = along.normalized();
+  T_camera_object.linear().col(1) = up.cross(along.normalized());
+  T_camera_object.linear().col(2) = up;
+  T_camera_object.translation() = cluster.centroid;
+  return T_camera_object;
+}
+
+int ClusterOfObject(const std::vector<segmentation::Cluster>& clusters, const model::ObjectModel& object,
+                    const geometry::Rigid& T_camera_object, const geometry::PinholeCamera& camera) {
+  std::vector<cv::Point> pixels;
+  for (const model::ModelPoint& point : object.points) {
+    const auto pixel = camera.Project(T_camera_object * point.position);
+    if (pixel && camera.Contains(*pixel)) pixels.emplace_back(std::lround(pixel->x()), std::lround(pixel->y()));
+  }
+  int best = -1;
+  size_t most = pixels.size() / 2;
+  for (size_t c = 0; c < clusters.size(); ++c) {
+    const size_t inside =
+        std::count_if(pixels.begin(), pixels.end(), [&](const cv::Point& p) { return clusters[c].mask.at<uchar>(p); });
+    if (inside <= most) continue;
+    most = inside;
+    best = static_cast<int>(c);
+  }
+  return best;
+}
+
+std::optional<model::ObjectModel> WithView(const model::ObjectModel& object, const rgbd::Frame& frame, const cv::Mat& mask,
+                                           const features::Features& features, const geometry::Rigid& T_camera_object,
+                                           const std::vector<recognition::GuidedMatch>& links, int min_points) {
+  cv::Mat inside;
+  cv::erode(mask, inside, cv::getStructuringElement(cv::MORPH_RECT, {2 * kMaskInset + 1, 2 * kMaskInset + 1}), {-1, -1}, 1,
+            cv::BORDER_CONSTANT, cv::Scalar(0));
+  std::map<int, int> linked_point;
+  for (const recognition::GuidedMatch& link : links) linked_point[link.keypoint] = link.point;
+
+  model::ObjectModel extended = object;
+  model::View view;
+  std::vector<int> chosen;
+  const geometry::Rigid T_object_camera = T_camera_object.inverse();
+  for (int k = 0; k < features.size(); ++k) {
+    const cv::Point2f& at = features.keypoints[k].pt;
+    const Eigen::Vector2d pixel(at.x, at.y);
+    if (!frame.camera.Contains(pixel) || !inside.at<uchar>(cv::Point(std::lround(at.x), std::lround(at.y)))) continue;
+    if (const auto link = linked_point.find(k); link != linked_point.end()) {
+      chosen.push_back(k);
+      view.points.push_back(link->second);
+      continue;
+    }
+    const auto point = rgbd::PointAt(frame, pixel);
+    const auto normal = rgbd::NormalAt(frame, pixel);
+    if (!point || !normal) continue;
+    chosen.push_back(k);
+    view.points.push_back(static_cast<int>(extended.points.size()));
+    extended.points.push_back({T_object_camera * *point, T_object_camera.linear() * *normal});
+  }
+  if (static_cast<int>(chosen.size()) < min_points) return std::nullopt;
+
+  const cv::Rect box = cv::boundingRect(mask);
+  const cv::Rect area =
+      cv::Rect(box.x - kCropMargin, box.y - kCropMargin, box.width + 2 * kCropMargin, box.height + 2 * kCropMargin) &
+      cv::Rect(0, 0, mask.cols, mask.rows);
+  view.id = object.views.empty() ? 0 : object.views.back().id + 1;
+  view.utime = frame.utime;
+  view.frame_id = frame.id;
+  view.T_camera_object = T_camera_object;
+  view.keyframe = Crop(frame, area);
+  view.mask = mask(area).clone();
+  view.features = features::Select(features, chosen);
+  for (cv::KeyPoint& keypoint : view.features.keypoints) keypoint.pt -= cv::Point2f(area.x, area.y);
+  extended.views.push_back(std::move(view));
+  return extended;
+}
+
+}  // namespace vantage::learning

@@ -1,0 +1,28 @@
+// Turns a frame with a known object pose into a new view of the model.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "model/object_model.h"
+#include "recognition/guided.h"
+#include "segmentation/clusters.h"
+
+namespace vantage::learning {
+
+// The pose of a new object seen as this cluster: origin at the cluster's centroid, z along the table's normal, x along the world's
+// x (the camera's where the world is not known) within the table.
+geometry::Rigid FirstPose(const rgbd::Frame& frame, const segmentation::Plane& plane, const segmentation::Cluster& cluster);
+
+// The cluster that shows the object: it holds most of the model's projected points. -1 where none holds half of those in the image.
+int ClusterOfObject(const std::vector<segmentation::Cluster>& clusters, const model::ObjectModel& object,
+                    const geometry::Rigid& T_camera_object, const geometry::PinholeCamera& camera);
+
+// A copy of the model with one more view: the frame's features inside `mask` that have depth. Those in `links` keep the model point
+// they were matched to, the others become new points. nullopt where fewer than `min_points` features have depth. `features` are
+// those of the frame, pixels of the frame.
+std::optional<model::ObjectModel> WithView(const model::ObjectModel& object, const rgbd::Frame& frame, const cv::Mat& mask,
+                                           const features::Features& features, const geometry::Rigid& T_camera_object,
+                                           const std::vector<recognition::GuidedMatch>& links, int min_points);
+
+}  // namespace vantage::learning
