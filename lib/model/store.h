@@ -11,6 +11,7 @@
 
 namespace vantage::model {
 
+// Not for several threads at once: every thread opens its own.
 class Store {
  public:
   enum class Mode { kRead, kWrite };  // kWrite creates the file where there is none.
@@ -36,8 +37,11 @@ class Store {
 
   // Every call is one transaction: durable when it returns (WAL, synchronous FULL), or nothing is changed. Throw std::runtime_error
   // (disk full, read-only, locked longer than 5 s).
-  void SaveObject(const ObjectModel& model);         // Replaces the whole object.
-  void AddView(const ObjectModel& model, int view);  // Appends that view, the points it added, and moves what refinement moved.
+  void SaveObject(const ObjectModel& model);  // Replaces the whole object, completeness included.
+  // Appends that view (an index), the points it added, and moves what refinement moved: points, poses and links of the others.
+  // Makes the object where there is none; measures stay as they were saved. Throws std::invalid_argument where the store does not
+  // hold just the other views.
+  void AddView(const ObjectModel& model, int view);
   void SaveMeasures(const std::string& name, const measures::Measures& measures, double completeness);
   void Remove(const std::string& name);
 
