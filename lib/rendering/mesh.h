@@ -22,15 +22,18 @@ struct Mesh {
 Mesh LoadMesh(const std::filesystem::path& file);
 
 // A box of the given size (metres) centred at the origin; each of the six faces (+x -x +y -y +z -z) wears the whole of the image of
-// the same index (indices wrap around; images are CV_8UC3 and may differ in size; at least one).
+// the same index, upright along z (top and bottom: along y), seen from outside (indices wrap around; images are CV_8UC3 and may
+// differ in size; at least one).
 Mesh BoxMesh(const Eigen::Vector3d& size_m, const std::vector<cv::Mat>& faces);
 
-// A flat rectangle in the xy plane, centred, normal +z, wearing `texture` repeated every `tile_m` metres.
+// A flat rectangle in the xy plane, centred, normal +z, wearing `texture` (upright towards +y) repeated every `tile_m` metres along
+// x, along y as its aspect asks.
 Mesh RectangleMesh(double size_x_m, double size_y_m, const cv::Mat& texture, double tile_m);
 
 // The surface one RGB-D frame shows where `mask` (CV_8UC1, non-zero = use; empty = everywhere) is set, as a textured mesh in
 // coordinates of the frame T_target_camera maps into. Neighbouring pixels are joined where their depths differ by less than
-// `max_jump_m` per pixel of step; `step_px` thins the grid. Empty where no depth is in the mask.
+// `max_jump_m` per pixel of step; `step_px` thins the grid; holes of up to 3 pixels on one surface are
+// bridged. Empty where no depth is in the mask.
 Mesh MeshFromFrame(const rgbd::Frame& frame, const cv::Mat& mask, const geometry::Rigid& T_target_camera, int step_px = 1,
                    double max_jump_m = 0.01);
 
