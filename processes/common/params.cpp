@@ -1,0 +1,256 @@
+#include "common/params.h"
+
+#include <sstream>
+
+namespace vantage::params {
+namespace {
+
+// The fields of every struct, once: visitor(name, value) for values, visitor.Nested(name, struct) for structs.
+
+template <typename Visitor>
+void Fields(Visitor& visit, features::FeatureParams& params) {
+  visit("type", params.type);
+  visit("max_keypoints", params.max_keypoints);
+  visit("contrast_threshold", params.contrast_threshold);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, model::ConfidenceParams& params) {
+  visit("support_px", params.support_px);
+  visit("max_incidence_deg", params.max_incidence_deg);
+  visit("occlusion_m", params.occlusion_m);
+  visit("min_points", params.min_points);
+  visit("max_views", params.max_views);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, pose::RansacParams& params) {
+  visit("inlier_px", params.inlier_px);
+  visit("failure_rate", params.failure_rate);
+  visit("min_iterations", params.min_iterations);
+  visit("max_iterations", params.max_iterations);
+  visit("max_depth_error_m", params.max_depth_error_m);
+  visit("min_depth_support", params.min_depth_support);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, recognition::RecogniserParams& params) {
+  visit.Nested("features", params.features);
+  visit.Nested("confidence", params.confidence);
+  visit("max_ratio", params.max_ratio);
+  visit("vote_bandwidth", params.vote_bandwidth);
+  visit("max_clusters", params.max_clusters);
+  visit.Nested("ransac", params.ransac);
+  visit("min_inliers", params.min_inliers);
+  visit("guided_radius_px", params.guided_radius_px);
+  visit("guided_max_distance", params.guided_max_distance);
+  visit("use_query_depth", params.use_query_depth);
+  visit("min_probability", params.min_probability);
+  visit("seed", params.seed);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, segmentation::PlaneParams& params) {
+  visit("max_distance_m", params.max_distance_m);
+  visit("confidence", params.confidence);
+  visit("max_iterations", params.max_iterations);
+  visit("step_px", params.step_px);
+  visit("min_share", params.min_share);
+  visit("max_depth_m", params.max_depth_m);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, segmentation::ClusterParams& params) {
+  visit("min_height_m", params.min_height_m);
+  visit("max_height_m", params.max_height_m);
+  visit("max_jump_m", params.max_jump_m);
+  visit("bridge_px", params.bridge_px);
+  visit("min_size_m", params.min_size_m);
+  visit("max_size_m", params.max_size_m);
+  visit("min_pixels", params.min_pixels);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, learning::LearnerParams& params) {
+  visit.Nested("plane", params.plane);
+  visit.Nested("clusters", params.clusters);
+  visit("new_view_confidence", params.new_view_confidence);
+  visit("min_track_probability", params.min_track_probability);
+  visit("min_view_points", params.min_view_points);
+  visit("min_view_angle_deg", params.min_view_angle_deg);
+  visit("max_mount_translation_m", params.max_mount_translation_m);
+  visit("max_mount_rotation_deg", params.max_mount_rotation_deg);
+  visit("require_mount_agreement", params.require_mount_agreement);
+  visit("roi_margin", params.roi_margin);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, assessment::TrialParams& params) {
+  visit("trials_per_view", params.trials_per_view);
+  visit("negatives_per_view", params.negatives_per_view);
+  visit("max_rotation_deg", params.max_rotation_deg);
+  visit("max_scale_octaves", params.max_scale_octaves);
+  visit("max_image_noise", params.max_image_noise);
+  visit("max_blur_px", params.max_blur_px);
+  visit("max_brightness", params.max_brightness);
+  visit("correct_m", params.correct_m);
+  visit("image_width", params.image_width);
+  visit("image_height", params.image_height);
+  visit("seed", params.seed);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, exploration::PlannerParams& params) {
+  visit("worth_s", params.worth_s);
+  visit("target_completeness", params.target_completeness);
+  visit("min_detect_probability", params.min_detect_probability);
+  visit("t_plan_s", params.t_plan_s);
+  visit("t_learn_s", params.t_learn_s);
+  visit("time_budget_s", params.time_budget_s);
+  visit("max_attempts", params.max_attempts);
+  visit("failure_radius_rad", params.failure_radius_rad);
+  visit("failure_discount", params.failure_discount);
+  visit("max_path_goals", params.max_path_goals);
+  visit("rule", params.rule);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, exploration::CandidateParams& params) {
+  visit("directions", params.directions);
+  visit("min_elevation_rad", params.min_elevation_rad);
+  visit("max_elevation_rad", params.max_elevation_rad);
+  visit("distances_m", params.distances_m);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, motion::SpeedLimits& params) {
+  visit("max_speed_m_s", params.max_speed_m_s);
+  visit("max_acceleration_m_s2", params.max_acceleration_m_s2);
+  visit("max_turn_rate_rad_s", params.max_turn_rate_rad_s);
+  visit("max_turn_acceleration_rad_s2", params.max_turn_acceleration_rad_s2);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, motion::FreeMountParams& params) {
+  visit("camera_radius_m", params.camera_radius_m);
+  visit("workspace_lower_m", params.workspace_lower_m);
+  visit("workspace_upper_m", params.workspace_upper_m);
+  visit("roadmap_samples", params.roadmap_samples);
+  visit.Nested("limits", params.limits);
+}
+
+template <typename Visitor>
+void Sections(Visitor& visit, LibraryParams& params) {
+  visit.Nested("recogniser", params.recogniser);
+  visit.Nested("learner", params.learner);
+  visit.Nested("trials", params.trials);
+  visit.Nested("planner", params.planner);
+  visit.Nested("candidates", params.candidates);
+  visit.Nested("mount", params.mount);
+}
+
+class YamlReader {
+ public:
+  explicit YamlReader(config::Mapping& mapping) : mapping_(mapping) {}
+
+  template <typename Value>
+  void operator()(const std::string& key, Value& value) {
+    mapping_.Get(key, value);
+  }
+
+  void operator()(const std::string& key, measures::CompletenessRule& rule) {
+    std::string text = measures::ToString(rule);
+    mapping_.Get(key, text);
+    try {
+      rule = measures::CompletenessRuleFromString(text);
+    } catch (const std::invalid_argument& error) {
+      mapping_.Fail(key, error.what());
+    }
+  }
+
+  template <typename Params>
+  void Nested(const std::string& key, Params& params) {
+    config::Mapping child = mapping_.Child(key);
+    YamlReader reader(child);
+    Fields(reader, params);
+    child.Finish();
+    child.Check(params);
+  }
+
+ private:
+  config::Mapping& mapping_;
+};
+
+class Flattener {
+ public:
+  Flattener(std::string prefix, std::map<std::string, std::string>& values) : prefix_(std::move(prefix)), values_(values) {}
+
+  template <typename Value>
+  void operator()(const std::string& key, const Value& value) {
+    std::ostringstream text;
+    text.precision(17);
+    Print(text, value);
+    values_[prefix_ + key] = text.str();
+  }
+
+  template <typename Params>
+  void Nested(const std::string& key, Params& params) {
+    Flattener nested(prefix_ + key + ".", values_);
+    Fields(nested, params);
+  }
+
+ private:
+  template <typename Value>
+  static void Print(std::ostream& text, const Value& value) {
+    text << value;
+  }
+  static void Print(std::ostream& text, const measures::CompletenessRule& rule) { text << measures::ToString(rule); }
+  static void Print(std::ostream& text, const Eigen::Vector3d& vector) { text << vector.transpose(); }
+  static void Print(std::ostream& text, const std::vector<double>& numbers) {
+    for (const double number : numbers) text << number << ' ';
+  }
+
+  std::string prefix_;
+  std::map<std::string, std::string>& values_;
+};
+
+template <typename Params>
+void ReadWhole(config::Mapping& mapping, Params& params) {
+  YamlReader reader(mapping);
+  Fields(reader, params);
+  mapping.Finish();
+  mapping.Check(params);
+}
+
+}  // namespace
+
+void Read(config::Mapping mapping, recognition::RecogniserParams& params) { ReadWhole(mapping, params); }
+void Read(config::Mapping mapping, learning::LearnerParams& params) { ReadWhole(mapping, params); }
+void Read(config::Mapping mapping, assessment::TrialParams& params) { ReadWhole(mapping, params); }
+void Read(config::Mapping mapping, exploration::PlannerParams& params) { ReadWhole(mapping, params); }
+void Read(config::Mapping mapping, exploration::CandidateParams& params) { ReadWhole(mapping, params); }
+void Read(config::Mapping mapping, motion::FreeMountParams& params) { ReadWhole(mapping, params); }
+
+void ReadSections(config::Mapping& mapping, LibraryParams& params) {
+  YamlReader reader(mapping);
+  Sections(reader, params);
+  params.learner.recogniser = params.recogniser;
+}
+
+LibraryParams LoadLibraryParams(const std::filesystem::path& file) {
+  config::Mapping mapping = config::Mapping::Load(file);
+  LibraryParams params;
+  ReadSections(mapping, params);
+  mapping.Finish();
+  return params;
+}
+
+std::map<std::string, std::string> Flatten(const LibraryParams& params) {
+  LibraryParams copy = params;
+  std::map<std::string, std::string> values;
+  Flattener flattener("", values);
+  Sections(flattener, copy);
+  return values;
+}
+
+}  // namespace vantage::params
