@@ -15,7 +15,6 @@ struct JudgeView {
   rgbd::Frame frame;
   features::Features features;                                  // Computed once.
   geometry::Rigid T_camera_mesh = geometry::Rigid::Identity();  // The truth.
-  measures::Viewpoint viewpoint;  // Direction and distance in mesh coordinates turned z-up (the table's frame).
 };
 
 class Judge {

@@ -1,0 +1,207 @@
+#include "session/explore.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "assessment/background.h"
+#include "learning/scene.h"
+
+namespace vantage::session {
+namespace {
+
+constexpr double kMinShareInView = 0.7;  // A recorded pose is a candidate where this share of the model would be in the image.
+
+// One run: the robot's state and what it has learned.
+class Run {
+ public:
+  Run(const simulation::World& world, const ExploreStart& start, const ExploreParams& params, const Judge* judge, model::Store* store,
+      const std::function<void(const ExploreStep&)>& progress)
+      : world_(world),
+        start_(start),
+        params_(params),
+        judge_(judge),
+        store_(store),
+        progress_(progress),
+        learner_(params.learner, start.object_name),
+        strategy_(exploration::MakeStrategy(params.strategy, params.planner, params.seed)) {}
+
+  ExploreResult Go() {
+    result_.strategy = params_.strategy;
+    result_.seed = params_.seed;
+    Begin();
+    while (Step()) {
+    }
+    Finish();
+    return result_;
+  }
+
+ private:
+  void Begin() {
+    const rgbd::Frame frame = world_.Look(start_.T_world_camera, params_.seed);
+    pose_ = *frame.T_world_camera;
+    const learning::LearnerResult first = learner_.Process(frame, start_.target);
+    if (!first.view_added) throw std::runtime_error("no object was found from the start pose: " + first.note);
+    NoteScene(frame);
+    result_.time.learn_s += params_.planner.t_learn_s;
+    LearnedView(frame);
+    Tell("first view", nullptr);
+  }
+
+  // One decision and the attempt it leads to; false when the strategy stops.
+  bool Step() {
+    const exploration::Belief belief = BeliefNow();
+    const auto mount = motion::MakeFreeMount(params_.mount, obstacles_);
+    const exploration::Decision decision = strategy_->Decide(belief, candidates_, pose_, *mount, result_.time.total_s());
+    if (decision.chosen < 0) {
+      result_.stop_reason = exploration::ToString(decision.stop);
+      Tell("stop: " + result_.stop_reason, &decision);
+      return false;
+    }
+    const exploration::Candidate& chosen = decision.candidates[decision.chosen];
+    result_.time.plan_s += params_.planner.t_plan_s;
+    result_.time.move_s += chosen.t_move_s;
+    result_.time.learn_s += params_.planner.t_learn_s;
+    Attempt(chosen, decision);
+    return true;
+  }
+
+  void Attempt(const exploration::Candidate& chosen, const exploration::Decision& decision) {
+    ++result_.attempts;
+    const rgbd::Frame frame = world_.Look(chosen.view.T_world_camera, params_.seed + 1000u * result_.attempts);
+    pose_ = *frame.T_world_camera;
+    const learning::LearnerResult learned = learner_.Process(frame);
+    exploration::Attempt attempt;
+    attempt.viewpoint = chosen.view.viewpoint;
+    attempt.detected = learned.state == learning::State::kTracking;
+    attempt.view_added = learned.view_added;
+    attempt.t_plan_s = params_.planner.t_plan_s;
+    attempt.t_learn_s = params_.planner.t_learn_s;
+    strategy_->Report(attempt);
+    if (learned.view_added) {
+      LearnedView(frame);
+    } else {
+      ++result_.failed_attempts;
+    }
+    Tell(learned.view_added ? "view added" : learned.note, &decision);
+  }
+
+  // After every new view: durable, assessed, judged.
+  void LearnedView(const rgbd::Frame& frame) {
+    const auto object = learner_.object();
+    const int newest = static_cast<int>(object->views.size()) - 1;
+    if (store_) store_->AddView(*object, newest);
+    AddBackground(frame);
+    assessment::TrialParams trials = params_.trials;
+    trials.seed += params_.seed;
+    const auto fresh = assessment::RunTrials(*object, newest, backgrounds_, params_.learner.recogniser, trials);
+    trials_.insert(trials_.end(), fresh.begin(), fresh.end());
+    learner_.SetMeasures(assessment::FitMeasures(trials_, params_.learner.recogniser));
+    ListCandidates();
+    result_.completeness = CompletenessNow();
+    if (store_) store_->SaveMeasures(object->name, learner_.object()->measures, result_.completeness);
+    result_.completeness_over_time.emplace_back(result_.time.total_s(), result_.completeness);
+    if (judge_ && params_.judge_over_time) result_.true_rate_over_time.emplace_back(result_.time.total_s(), TrueRate());
+  }
+
+  void AddBackground(const rgbd::Frame& frame) {
+    if (static_cast<int>(backgrounds_.size()) >= params_.max_backgrounds) return;
+    cv::Mat objects = cv::Mat::zeros(frame.color.size(), CV_8UC1);
+    for (const segmentation::Cluster& cluster : learner_.clusters()) objects |= cluster.mask;
+    backgrounds_.push_back(assessment::MaskedBackground(frame.color, objects));
+  }
+
+  void NoteScene(const rgbd::Frame& frame) {
+    obstacles_ = world_.Furniture();
+    for (const segmentation::Cluster& cluster : learner_.clusters()) {
+      auto points = learning::ClusterHullPoints(frame, *learner_.plane(), cluster);
+      if (points.size() >= 4) obstacles_.hulls.push_back({"object " + std::to_string(obstacles_.hulls.size()), std::move(points)});
+    }
+  }
+
+  // Where the camera could go, given where the object stands.
+  void ListCandidates() {
+    if (!candidates_.empty()) return;
+    const geometry::Rigid T_world_object = *learner_.T_world_object();
+    const std::vector<geometry::Rigid> recorded = world_.Viewpoints();
+    if (recorded.empty()) {
+      candidates_ = exploration::SampleCandidates(T_world_object, params_.candidates);
+    }
+    const Eigen::Matrix3Xd points = learner_.object()->PointMatrix();
+    for (size_t i = 0; i < recorded.size(); ++i) {
+      if (ShareInImage(points, recorded[i].inverse() * T_world_object, world_.Camera()) < kMinShareInView) continue;
+      candidates_.push_back({static_cast<int>(i), recorded[i], exploration::ViewpointOf(recorded[i], T_world_object)});
+    }
+    const auto mount = motion::MakeFreeMount(params_.mount, obstacles_);
+    for (const exploration::CandidateView& candidate : candidates_) {
+      if (mount->WhyUnreachable(candidate.T_world_camera).empty()) reachable_.push_back({candidate.viewpoint, 1.0});
+    }
+  }
+
+  exploration::Belief BeliefNow() const {
+    const auto object = learner_.object();
+    return {object->viewpoints(), object->measures.predicted, reachable_};
+  }
+
+  double CompletenessNow() const {
+    const exploration::Belief belief = BeliefNow();
+    return measures::Completeness(belief.views, belief.reachable, belief.predicted, params_.planner.rule);
+  }
+
+  double TrueRate() const {
+    return judge_->TrueDetectionRate(learner_.object(), start_.T_world_mesh.inverse() * *learner_.T_world_object());
+  }
+
+  void Finish() {
+    result_.object = learner_.object();
+    result_.views = static_cast<int>(result_.object->views.size());
+    result_.completeness = CompletenessNow();
+    if (!judge_) return;
+    result_.true_detection_rate =
+        result_.true_rate_over_time.empty() ? TrueRate() : result_.true_rate_over_time.back().second;
+  }
+
+  void Tell(const std::string& note, const exploration::Decision* decision) const {
+    if (!progress_) return;
+    progress_({result_.time.total_s(), result_.attempts, static_cast<int>(learner_.object()->views.size()), result_.completeness, note,
+               decision});
+  }
+
+  const simulation::World& world_;
+  const ExploreStart& start_;
+  const ExploreParams& params_;
+  const Judge* judge_;
+  model::Store* store_;
+  const std::function<void(const ExploreStep&)>& progress_;
+
+  learning::Learner learner_;
+  std::unique_ptr<exploration::Strategy> strategy_;
+  geometry::Rigid pose_ = geometry::Rigid::Identity();  // T_world_camera now.
+  motion::Obstacles obstacles_;
+  std::vector<cv::Mat> backgrounds_;
+  std::vector<assessment::Trial> trials_;
+  std::vector<exploration::CandidateView> candidates_;
+  std::vector<measures::WeightedViewpoint> reachable_;
+  ExploreResult result_;
+};
+
+}  // namespace
+
+void ExploreParams::Check() const {
+  learner.Check();
+  planner.Check();
+  candidates.Check();
+  mount.Check();
+  trials.Check();
+  if (strategy != "planner" && strategy != "random") {
+    throw std::invalid_argument("explore: strategy must be \"planner\" or \"random\", is \"" + strategy + "\"");
+  }
+  if (max_backgrounds < 0) throw std::invalid_argument("explore: max_backgrounds must be >= 0");
+}
+
+ExploreResult Explore(const simulation::World& world, const ExploreStart& start, const ExploreParams& params, const Judge* judge,
+                      model::Store* store, const std::function<void(const ExploreStep&)>& progress) {
+  params.Check();
+  return Run(world, start, params, judge, store, progress).Go();
+}
+
+}  // namespace vantage::session

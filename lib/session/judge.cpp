@@ -1,0 +1,48 @@
+#include "session/judge.h"
+
+namespace vantage::session {
+namespace {
+
+constexpr double kCorrect = 0.04;       // Metres of mean point distance (section V-A of the paper).
+constexpr double kDetected = 0.5;       // p(o|c) from which a detection counts as one.
+constexpr double kMinShareInImage = 0.5;
+
+}  // namespace
+
+double ShareInImage(const Eigen::Matrix3Xd& points, const geometry::Rigid& T_camera_points, const geometry::PinholeCamera& camera) {
+  if (points.cols() == 0) return 0.0;
+  int inside = 0;
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const auto pixel = camera.Project(T_camera_points * Eigen::Vector3d(points.col(i)));
+    inside += pixel && camera.Contains(*pixel);
+  }
+  return double(inside) / points.cols();
+}
+
+Judge::Judge(const recognition::RecogniserParams& recogniser, Eigen::Matrix3Xd points_in_mesh)
+    : recogniser_params_(recogniser), points_in_mesh_(std::move(points_in_mesh)) {}
+
+bool Judge::Add(const rgbd::Frame& frame, const geometry::Rigid& T_camera_mesh) {
+  if (ShareInImage(points_in_mesh_, T_camera_mesh, frame.camera) < kMinShareInImage) return false;
+  const recognition::Recogniser recogniser(recogniser_params_);
+  views_.push_back({frame, recogniser.Extract(frame), T_camera_mesh});
+  return true;
+}
+
+double Judge::TrueDetectionRate(std::shared_ptr<const model::ObjectModel> object, const geometry::Rigid& T_mesh_object) const {
+  if (views_.empty()) return 0.0;
+  recognition::Recogniser recogniser(recogniser_params_);
+  recogniser.Set(object);
+  int right = 0;
+  for (const JudgeView& view : views_) {
+    for (const recognition::Detection& detection : recogniser.Recognise(view.frame, view.features)) {
+      if (detection.probability < kDetected) continue;
+      const geometry::Rigid T_camera_mesh = detection.T_camera_object * T_mesh_object.inverse();
+      right += model::MeanPointDistance(points_in_mesh_, T_camera_mesh, view.T_camera_mesh) < kCorrect;
+      break;
+    }
+  }
+  return double(right) / views_.size();
+}
+
+}  // namespace vantage::session
