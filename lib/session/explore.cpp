@@ -14,8 +14,8 @@ constexpr double kMinShareInView = 0.7;  // A recorded pose is a candidate where
 // One run: the robot's state and what it has learned.
 class Run {
  public:
-  Run(const simulation::World& world, const ExploreStart& start, const ExploreParams& params, const Judge* judge, model::Store* store,
-      const std::function<void(const ExploreStep&)>& progress)
+  Run(const simulation::World& world, const ExploreStart& start, const ExploreParams& params, const Judge* judge,
+      model::Store* store, const std::function<void(const ExploreStep&)>& progress)
       : world_(world),
         start_(start),
         params_(params),
@@ -156,14 +156,13 @@ class Run {
     result_.views = static_cast<int>(result_.object->views.size());
     result_.completeness = CompletenessNow();
     if (!judge_) return;
-    result_.true_detection_rate =
-        result_.true_rate_over_time.empty() ? TrueRate() : result_.true_rate_over_time.back().second;
+    result_.true_detection_rate = result_.true_rate_over_time.empty() ? TrueRate() : result_.true_rate_over_time.back().second;
   }
 
   void Tell(const std::string& note, const exploration::Decision* decision) const {
     if (!progress_) return;
-    progress_({result_.time.total_s(), result_.attempts, static_cast<int>(learner_.object()->views.size()), result_.completeness, note,
-               decision});
+    progress_({result_.time.total_s(), result_.attempts, static_cast<int>(learner_.object()->views.size()), result_.completeness,
+               note, decision});
   }
 
   const simulation::World& world_;

@@ -3,8 +3,8 @@
 namespace vantage::session {
 namespace {
 
-constexpr double kCorrect = 0.04;       // Metres of mean point distance (section V-A of the paper).
-constexpr double kDetected = 0.5;       // p(o|c) from which a detection counts as one.
+constexpr double kCorrect = 0.04;  // Metres of mean point distance (section V-A of the paper).
+constexpr double kDetected = 0.5;  // p(o|c) from which a detection counts as one.
 constexpr double kMinShareInImage = 0.5;
 
 }  // namespace
