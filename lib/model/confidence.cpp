@@ -30,6 +30,7 @@ void ConfidenceParams::Check() const {
     if (!ok) throw std::invalid_argument(std::string("confidence: ") + what);
   };
   require(support_px > 0.0, "support_px must be > 0");
+  require(max_scale_ratio > 1.0, "max_scale_ratio must be > 1");
   require(max_incidence_deg > 0.0 && max_incidence_deg <= 90.0, "max_incidence_deg must be in (0, 90]");
   require(occlusion_m > 0.0, "occlusion_m must be > 0");
   require(min_points >= 1, "min_points must be >= 1");
@@ -37,7 +38,8 @@ void ConfidenceParams::Check() const {
 }
 
 std::string ConfidenceParams::Fingerprint() const {
-  return std::to_string(support_px) + ":" + std::to_string(max_incidence_deg) + ":" + std::to_string(min_points);
+  return std::to_string(support_px) + ":" + std::to_string(max_scale_ratio) + ":" + std::to_string(max_incidence_deg) + ":" +
+         std::to_string(min_points);
 }
 
 KeypointGrid::KeypointGrid(const std::vector<cv::KeyPoint>& keypoints, int width, int height, double cell_px)
@@ -48,6 +50,7 @@ KeypointGrid::KeypointGrid(const std::vector<cv::KeyPoint>& keypoints, int width
     const int row = std::clamp(static_cast<int>(keypoint.pt.y / cell_px_), 0, rows_ - 1);
     cells_[row * columns_ + column].push_back(static_cast<int>(points_.size()));
     points_.push_back(keypoint.pt);
+    sizes_.push_back(keypoint.size);
   }
 }
 
@@ -66,17 +69,26 @@ std::vector<int> KeypointGrid::Near(const Eigen::Vector2d& pixel, double radius_
   return near;
 }
 
-bool KeypointGrid::HasNear(const Eigen::Vector2d& pixel, double radius_px) const { return !Near(pixel, radius_px).empty(); }
+bool KeypointGrid::HasNear(const Eigen::Vector2d& pixel, double radius_px, double size, double max_scale_ratio) const {
+  const std::vector<int> near = Near(pixel, radius_px);
+  return std::any_of(near.begin(), near.end(),
+                     [&](int i) { return sizes_[i] < size * max_scale_ratio && size < sizes_[i] * max_scale_ratio; });
+}
 
 Confidence ViewConfidence(const ObjectModel& model, int view, const geometry::Rigid& T_camera_object, const rgbd::Frame& frame,
                           const KeypointGrid& keypoints, const ConfidenceParams& params) {
   Confidence confidence;
   confidence.view = view;
-  for (const int index : model.views[view].points) {
-    const auto pixel = VisiblePixel(model.points[index], T_camera_object, frame, params);
+  const View& seen = model.views[view];
+  const double zoom = frame.camera.fx / seen.keyframe.camera.fx;
+  for (size_t k = 0; k < seen.points.size(); ++k) {
+    const ModelPoint& point = model.points[seen.points[k]];
+    const auto pixel = VisiblePixel(point, T_camera_object, frame, params);
     if (!pixel) continue;
     ++confidence.visible;
-    confidence.support += keypoints.HasNear(*pixel, params.support_px);
+    const double nearer = (seen.T_camera_object * point.position).z() / (T_camera_object * point.position).z();
+    const double size = seen.features.keypoints[k].size * zoom * nearer;
+    confidence.support += keypoints.HasNear(*pixel, params.support_px, size, params.max_scale_ratio);
   }
   if (confidence.visible >= params.min_points) confidence.value = double(confidence.support) / confidence.visible;  // Equation (1)
   return confidence;

@@ -9,7 +9,8 @@
 namespace vantage::model {
 
 struct ConfidenceParams {
-  double support_px = 4.0;          // t_int: an interest point this near supports a projected model point; > 0.
+  double support_px = 2.0;          // t_int: an interest point this near supports a projected model point...; > 0.
+  double max_scale_ratio = 1.5;     // ...where its size differs from the expected by less than this factor; > 1.
   double max_incidence_deg = 80.0;  // A point is visible where line of sight and normal differ by less; (0, 90].
   double occlusion_m = 0.03;        // Measured depth this much in front of a point hides it (where there is depth); > 0.
   int min_points = 8;               // A view with fewer visible model points says nothing: c_ij = 0; >= 1.
@@ -24,12 +25,14 @@ class KeypointGrid {
  public:
   KeypointGrid(const std::vector<cv::KeyPoint>& keypoints, int width, int height, double cell_px = 8.0);
 
-  bool HasNear(const Eigen::Vector2d& pixel, double radius_px) const;
+  // Whether there is one within the radius whose size is within a factor `max_scale_ratio` of `size`.
+  bool HasNear(const Eigen::Vector2d& pixel, double radius_px, double size, double max_scale_ratio) const;
   // Indices of the keypoints within the radius.
   std::vector<int> Near(const Eigen::Vector2d& pixel, double radius_px) const;
 
  private:
   std::vector<cv::Point2f> points_;
+  std::vector<float> sizes_;
   std::vector<std::vector<int>> cells_;
   int columns_;
   int rows_;
