@@ -9,11 +9,13 @@
 namespace vantage::segmentation {
 
 struct ClusterParams {
-  double min_height_m = 0.012;  // Above the plane; > 0.
-  double max_height_m = 0.6;    // > min_height_m.
+  double min_height_m = 0.01;  // Above the plane; > 0.
+  double max_height_m = 0.6;   // > min_height_m.
   double max_jump_m =
       0.015;  // Neighbouring pixels further apart in depth belong to different objects, at 1 m; grows with depth squared; > 0.
   int bridge_px = 3;         // Holes up to this wide do not part an object; >= 1.
+  double merge_share = 0.2;  // A part with this share of its footprint and of its height within another's belongs to it (shadows
+                             // and dark insides part what is one); > 0, above 1 to keep all apart.
   double min_size_m = 0.02;  // Smaller (longest side) clusters are not objects; > 0.
   double max_size_m = 0.6;   // > min_size_m.
   int min_pixels = 300;      // >= 1.
@@ -29,7 +31,7 @@ struct Cluster {
   bool touches_border = false;
 };
 
-// Clusters by falling number of pixels. Camera coordinates.
+// Clusters by falling number of pixels. Camera coordinates. Empty where the frame has no depth. About 25 ms for 640x480.
 std::vector<Cluster> FindClusters(const rgbd::Frame& frame, const Plane& plane, const ClusterParams& params);
 
 // The cluster that holds the pixel (or whose mask is nearest, within 20 px); -1 where there is none.
