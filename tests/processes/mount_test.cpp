@@ -1,0 +1,162 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <vantage/operator_command_t.hpp>
+#include <vector>
+
+#include "messaging/channels.h"
+#include "mount/node.h"
+
+namespace vantage::mount {
+namespace {
+
+using messaging::MountState;
+
+// A mount on a bus whose clock the test turns.
+class MountTest : public ::testing::Test {
+ protected:
+  MountTest() : bus_("memq://", [this] { return now_us_; }) {
+    bus_.Subscribe<mount_state_t>(messaging::kMountState, [this](const mount_state_t& message) {
+      const auto state = messaging::FromMessage(message);
+      ASSERT_TRUE(state) << state.error;
+      states_.push_back(*state);
+    });
+    node_ = std::make_unique<MountNode>(bus_, MountParams());
+    Run(0.1);
+  }
+
+  void Run(double seconds) {
+    const auto end_us = now_us_ + static_cast<std::int64_t>(seconds * 1e6);
+    while (now_us_ < end_us) {
+      now_us_ += 5000;
+      bus_.Drain();
+      node_->RunStep();
+    }
+    bus_.Drain();
+  }
+
+  motion::Trajectory Path(const Eigen::Vector3d& by_m) const {
+    geometry::Rigid goal = node_->state().T_world_mount;
+    goal.translation() += by_m;
+    return motion::TimePath({node_->state().T_world_mount, goal}, motion::SpeedLimits());
+  }
+
+  void Send(const motion::Trajectory& trajectory, std::int64_t id) {
+    bus_.Publish(messaging::kMountCommand, messaging::ToMessage(trajectory, id, now_us_));
+  }
+
+  std::int64_t now_us_ = 1000000;
+  messaging::Bus bus_;
+  std::unique_ptr<MountNode> node_;
+  std::vector<MountState> states_;
+};
+
+TEST_F(MountTest, SaysWhereItIsThirtyTimesASecond) {
+  states_.clear();
+  Run(2.0);
+  EXPECT_NEAR(static_cast<double>(states_.size()), 60.0, 4.0);
+  EXPECT_EQ(states_.back().result, MountState::Result::kIdle);
+  EXPECT_TRUE(states_.back().T_world_camera().translation().isApprox(MountParams().start_eye_m, 1e-9));
+}
+
+TEST_F(MountTest, DrivesATrajectoryInTimeAndWithinTheLimits) {
+  const auto path = Path({0.0, 0.3, 0.1});
+  const auto goal = path.waypoints.back().T_world_mount;
+  Send(path, 7);
+  Run(path.duration_s() * 0.5);
+  EXPECT_TRUE(states_.back().moving);
+  EXPECT_EQ(states_.back().result, MountState::Result::kExecuting);
+  EXPECT_GT(geometry::Difference(states_.back().T_world_mount, goal).translation_m, 0.05);
+  Run(path.duration_s() * 0.5 + 0.2);
+  EXPECT_FALSE(states_.back().moving);
+  EXPECT_EQ(states_.back().result, MountState::Result::kArrived);
+  EXPECT_EQ(states_.back().command_id, 7);
+  EXPECT_LT(geometry::Difference(states_.back().T_world_mount, goal).translation_m, 1e-9);
+  for (std::size_t i = 1; i < states_.size(); ++i) {
+    const double time_s = 1e-6 * static_cast<double>(states_[i].utime - states_[i - 1].utime);
+    const double step_m = geometry::Difference(states_[i].T_world_mount, states_[i - 1].T_world_mount).translation_m;
+    EXPECT_LE(step_m, 1.05 * motion::SpeedLimits().max_speed_m_s * time_s + 1e-9);
+  }
+}
+
+TEST_F(MountTest, RefusesWhatItMustNotDriveAndStaysWhereItIs) {
+  const auto start = node_->state().T_world_mount;
+  auto fast = Path({0.0, 0.3, 0.0});
+  for (auto& waypoint : fast.waypoints) waypoint.time_s *= 0.5;
+  Send(fast, 1);
+  Run(0.1);
+  EXPECT_EQ(states_.back().result, MountState::Result::kRefused);
+  EXPECT_NE(states_.back().refusal.find("m/s"), std::string::npos) << states_.back().refusal;
+
+  auto elsewhere = Path({0.0, 0.3, 0.0});
+  for (auto& waypoint : elsewhere.waypoints) waypoint.T_world_mount.translation().x() += 0.1;
+  Send(elsewhere, 2);
+  Run(0.1);
+  EXPECT_EQ(states_.back().command_id, 2);
+  EXPECT_NE(states_.back().refusal.find("where the mount is"), std::string::npos) << states_.back().refusal;
+
+  auto broken = messaging::ToMessage(Path({0.0, 0.3, 0.0}), 3, now_us_);
+  broken.waypoints[2].T_world_mount.position[0] = std::nan("");
+  bus_.Publish(messaging::kMountCommand, broken);
+  Run(0.1);
+  EXPECT_EQ(states_.back().command_id, 3);
+  EXPECT_EQ(states_.back().result, MountState::Result::kRefused);
+  EXPECT_EQ(node_->bad(), 1);
+
+  bus_.PublishRaw(messaging::kMountCommand, "rubbish", 7);
+  Run(0.1);
+  EXPECT_EQ(node_->bad(), 2);
+  EXPECT_TRUE(node_->state().T_world_mount.isApprox(start));
+}
+
+TEST_F(MountTest, AnotherCommandMeanwhileIsNotDrivenAndTheSameAgainIsNoMatter) {
+  const auto path = Path({0.0, 0.3, 0.0});
+  Send(path, 1);
+  Run(0.3);
+  Send(path, 1);
+  Send(Path({0.1, 0.0, 0.0}), 2);
+  Run(path.duration_s());
+  EXPECT_EQ(states_.back().command_id, 1);
+  EXPECT_EQ(states_.back().result, MountState::Result::kArrived);
+  EXPECT_LT(geometry::Difference(states_.back().T_world_mount, path.waypoints.back().T_world_mount).translation_m, 1e-9);
+}
+
+TEST_F(MountTest, StopsAtOnce) {
+  Send(Path({0.0, 0.3, 0.0}), 1);
+  Run(0.5);
+  operator_command_t stop;
+  stop.utime = now_us_;
+  stop.command = "stop";
+  bus_.Publish(messaging::kOperatorCommand, stop);
+  Run(0.1);
+  const auto where = states_.back().T_world_mount;
+  EXPECT_EQ(states_.back().result, MountState::Result::kStopped);
+  Run(1.0);
+  EXPECT_TRUE(states_.back().T_world_mount.isApprox(where));
+  Send(Path({0.0, -0.05, 0.0}), 2);
+  Run(2.0);
+  EXPECT_EQ(states_.back().result, MountState::Result::kArrived);
+}
+
+TEST(MountParams, FilesAreReadStrictly) {
+  const auto file = std::filesystem::temp_directory_path() / "vantage_mount_test.yaml";
+  const auto error_of = [&](const std::string& text) -> std::string {
+    std::ofstream(file) << text;
+    try {
+      LoadMountParams(file.string());
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(error_of("rate_hz: 50\nlimits:\n  max_speed_m_s: 0.1\n"), "");
+  EXPECT_NE(error_of("rate_khz: 50\n").find("rate_khz"), std::string::npos);
+  EXPECT_NE(error_of("limits:\n  max_sped: 0.1\n").find("max_sped"), std::string::npos);
+  EXPECT_NE(error_of("rate_hz: -1\n").find("rate_hz must be in"), std::string::npos);
+  std::filesystem::remove(file);
+}
+
+}  // namespace
+}  // namespace vantage::mount
