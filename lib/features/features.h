@@ -45,9 +45,9 @@ struct NearestPair {
   float best_distance = 2.f;
   float second_distance = 2.f;
 };
-// The nearest train rows of every query row (both CV_32F, unit rows of equal length, a multiple of 8). `groups` (one int per train
+// The nearest train rows of every query row (both CV_32F, unit rows of one length). `groups` (one int per train
 // row, may be empty): the second best is sought outside the group of the best, so that views of one physical point do not compete.
-// Exhaustive: about 0.1 s for 1500 x 10000 rows of 128.
+// Exhaustive: about 80 ms for 3000 x 4000 rows of 128 on one core.
 std::vector<NearestPair> NearestTwo(const cv::Mat& query, const cv::Mat& train, const std::vector<int>& groups = {});
 
 // Matches whose best distance is below `max_ratio` times the second best and below `max_distance`.

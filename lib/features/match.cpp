@@ -7,24 +7,28 @@
 namespace vantage::features {
 namespace {
 
-constexpr int kBlock = 8;  // Query rows that share one pass over the train rows.
-constexpr int kLanes = 8;  // Floats a vector register holds.
+constexpr int kLanes = 8;       // Floats a vector register holds: one per query row.
+constexpr int kQueryRows = 16;  // Query rows that share one pass over the train rows: two registers.
+constexpr int kTrainRows = 4;   // Train rows per step; 2 x 4 sums stay in registers.
 
 typedef float Lanes __attribute__((vector_size(kLanes * sizeof(float)), aligned(4)));
 
-// Inner products of kBlock query rows (contiguous, `length` apart) with one train row.
-// The compiler makes one version for AVX2 and one for any machine, and picks at run time.
-__attribute__((target_clones("arch=haswell", "default"))) void InnerProducts(const float* query, const float* train, int length,
+// Inner products of 4 train rows with 16 query rows. `queries` is transposed: value i of all query rows, then value i + 1; so no sum runs
+// across a register. The compiler makes one version for AVX2 and one for any machine, and picks at run time.
+__attribute__((target_clones("arch=x86-64-v3", "default"))) void InnerProducts(const float* queries, const float* const* train, int length,
                                                                              float* products) {
-  Lanes sums[kBlock] = {};
-  for (int i = 0; i < length; i += kLanes) {
-    const Lanes t = *reinterpret_cast<const Lanes*>(train + i);
-    for (int q = 0; q < kBlock; ++q) sums[q] += *reinterpret_cast<const Lanes*>(query + q * length + i) * t;
+  Lanes low[kTrainRows] = {}, high[kTrainRows] = {};
+  for (int i = 0; i < length; ++i) {
+    const Lanes q_low = *reinterpret_cast<const Lanes*>(queries + i * kQueryRows);
+    const Lanes q_high = *reinterpret_cast<const Lanes*>(queries + i * kQueryRows + kLanes);
+    for (int t = 0; t < kTrainRows; ++t) {
+      low[t] += q_low * train[t][i];
+      high[t] += q_high * train[t][i];
+    }
   }
-  for (int q = 0; q < kBlock; ++q) {
-    float sum = 0.f;
-    for (int lane = 0; lane < kLanes; ++lane) sum += sums[q][lane];
-    products[q] = sum;
+  for (int t = 0; t < kTrainRows; ++t) {
+    *reinterpret_cast<Lanes*>(products + t * kQueryRows) = low[t];
+    *reinterpret_cast<Lanes*>(products + t * kQueryRows + kLanes) = high[t];
   }
 }
 
@@ -56,23 +60,30 @@ float Distance(float product) { return std::sqrt(std::max(0.f, 2.f - 2.f * produ
 std::vector<NearestPair> NearestTwo(const cv::Mat& query, const cv::Mat& train, const std::vector<int>& groups) {
   std::vector<NearestPair> nearest(query.rows);
   if (query.rows == 0 || train.rows == 0) return nearest;
-  if (query.type() != CV_32F || train.type() != CV_32F || query.cols != train.cols || query.cols % kLanes != 0) {
-    throw std::invalid_argument("features: descriptors must be CV_32F rows of one length, a multiple of 8; found " +
+  if (query.type() != CV_32F || train.type() != CV_32F || query.cols != train.cols) {
+    throw std::invalid_argument("features: descriptors must be CV_32F rows of one length; found " +
                                 std::to_string(query.cols) + " and " + std::to_string(train.cols));
   }
   if (!groups.empty() && static_cast<int>(groups.size()) != train.rows) {
     throw std::invalid_argument("features: groups must name every train row");
   }
   const int length = query.cols;
-  std::vector<float> block(static_cast<size_t>(kBlock) * length);
-  float products[kBlock];
-  for (int start = 0; start < query.rows; start += kBlock) {
-    const int count = std::min(kBlock, query.rows - start);
-    for (int q = 0; q < count; ++q) std::copy_n(query.ptr<float>(start + q), length, block.data() + q * length);
-    BestTwo best[kBlock];
-    for (int row = 0; row < train.rows; ++row) {
-      InnerProducts(block.data(), train.ptr<float>(row), length, products);
-      for (int q = 0; q < count; ++q) best[q].Offer(row, products[q], groups);
+  std::vector<float> queries(static_cast<size_t>(kQueryRows) * length);
+  float products[kTrainRows * kQueryRows];
+  for (int start = 0; start < query.rows; start += kQueryRows) {
+    const int count = std::min(kQueryRows, query.rows - start);
+    for (int q = 0; q < count; ++q) {
+      const float* row = query.ptr<float>(start + q);
+      for (int i = 0; i < length; ++i) queries[i * kQueryRows + q] = row[i];
+    }
+    BestTwo best[kQueryRows];
+    for (int row = 0; row < train.rows; row += kTrainRows) {
+      const float* rows[kTrainRows];
+      for (int t = 0; t < kTrainRows; ++t) rows[t] = train.ptr<float>(std::min(row + t, train.rows - 1));
+      InnerProducts(queries.data(), rows, length, products);
+      for (int t = 0; t < std::min(kTrainRows, train.rows - row); ++t) {
+        for (int q = 0; q < count; ++q) best[q].Offer(row + t, products[t * kQueryRows + q], groups);
+      }
     }
     for (int q = 0; q < count; ++q) {
       NearestPair& pair = nearest[start + q];
