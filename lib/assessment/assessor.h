@@ -21,8 +21,8 @@ struct TrialParams {
   double max_blur_px = 1.6;        // Sigma, one of 8 even levels from 0; >= 0.
   double max_brightness = 0.25;    // Relative change of brightness, and of gamma; [0, 1).
   double correct_m = 0.04;         // Mean point distance below which a detection is right; > 0.
-  int image_width = 320;           // Virtual images are crops around the object of this size at most.
-  int image_height = 240;
+  int image_width = 320;           // Virtual images are crops around the object, as tight as they can be but
+  int image_height = 240;          // never larger than twice this, close objects included; >= 64.
   std::uint32_t seed = 0;
 
   void Check() const;

@@ -1,0 +1,52 @@
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "assessment/assessor.h"
+#include "geometry/view_sphere.h"
+
+namespace vantage::assessment {
+
+measures::Measures FitMeasures(const std::vector<Trial>& trials, const recognition::RecogniserParams& recogniser,
+                               measures::Source source) {
+  measures::Measures measures;
+  std::vector<measures::ConfidenceSample> proposals;
+  for (const Trial& trial : trials) {
+    if (trial.hypothesis) proposals.push_back({trial.confidence, trial.correct});
+  }
+  measures.observed = measures::ObservedSuccess::Fit(proposals, source);
+
+  std::vector<measures::PredictionSample> predictions;
+  for (const Trial& trial : trials) {
+    if (!trial.object_shown) continue;
+    const bool detected = trial.hypothesis && trial.correct && measures.observed.Probability(trial.confidence) >= 0.5;
+    predictions.push_back({trial.rotation_rad, trial.log2_scale, detected});
+  }
+  measures.predicted = measures::PredictedSuccess::Fit(predictions, source);
+  if (!trials.empty()) measures.fingerprint = recogniser.Fingerprint();
+  return measures;
+}
+
+std::vector<measures::WeightedViewpoint> UniformViewpoints(double min_elevation_rad, double max_elevation_rad,
+                                                           const std::vector<double>& distances_m, int directions) {
+  if (!(min_elevation_rad < max_elevation_rad) || min_elevation_rad >= M_PI_2 || max_elevation_rad <= -M_PI_2) {
+    throw std::invalid_argument("UniformViewpoints: expected min_elevation_rad < max_elevation_rad within the sphere");
+  }
+  if (directions < 1 || distances_m.empty()) throw std::invalid_argument("UniformViewpoints: expected directions and distances");
+  // Even over the band itself: z is uniform on a sphere, and so is any slice of it.
+  const double z_min = std::sin(std::max(min_elevation_rad, -M_PI_2)), z_max = std::sin(std::min(max_elevation_rad, M_PI_2));
+  std::vector<measures::WeightedViewpoint> viewpoints;
+  const double weight = 1.0 / (static_cast<double>(directions) * static_cast<double>(distances_m.size()));
+  for (const Eigen::Vector3d& direction : geometry::EvenDirections(directions)) {
+    const double z = z_min + (z_max - z_min) * 0.5 * (direction.z() + 1.0);
+    const double radius = std::sqrt(1.0 - z * z), azimuth = geometry::Azimuth(direction);
+    const Eigen::Vector3d in_band(radius * std::cos(azimuth), radius * std::sin(azimuth), z);
+    for (double distance_m : distances_m) {
+      if (!(distance_m > 0.0)) throw std::invalid_argument("UniformViewpoints: distances must be > 0");
+      viewpoints.push_back({{in_band, distance_m}, weight});
+    }
+  }
+  return viewpoints;
+}
+
+}  // namespace vantage::assessment

@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "assessment/assessor.h"
+#include "assessment/board.h"
+#include "assessment/virtual_object.h"
+
+namespace vantage::assessment {
+namespace {
+
+constexpr double kDegree = M_PI / 180.0;
+
+// Four views of the box from all round, and what is behind it.
+class BoardTrials : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    VANTAGE_NEEDS_DATA("board");
+    const vantage::testing::Board board;
+    for (int id : {0, 40, 80, 120}) {
+      board.AddView(id, recogniser_.features, &object_);
+      backgrounds_.push_back(WithoutObject(board.scene.Load(id).color, board.Mask(id)));
+    }
+  }
+  void SetUp() override {
+    VANTAGE_NEEDS_DATA("board");
+    ASSERT_GE(object_.views.size(), 3u);
+  }
+
+  static inline const recognition::RecogniserParams recogniser_;
+  static inline model::ObjectModel object_;
+  static inline std::vector<cv::Mat> backgrounds_;
+};
+
+bool Same(const Trial& a, const Trial& b) {
+  return a.view == b.view && a.object_shown == b.object_shown && a.rotation_rad == b.rotation_rad && a.log2_scale == b.log2_scale &&
+         a.hypothesis == b.hypothesis && a.confidence == b.confidence && a.correct == b.correct;
+}
+
+TEST_F(BoardTrials, TheBoxTeachesItsOwnMeasures) {
+  TrialParams params;
+  params.trials_per_view = 24;
+  params.negatives_per_view = 4;
+  const std::vector<Trial> trials = RunTrials(object_, 0, backgrounds_, recogniser_, params);
+  ASSERT_EQ(trials.size(), object_.views.size() * 28);
+
+  int near = 0, near_right = 0, far = 0, far_right = 0, without_right = 0;
+  double right_confidence = 0.0, wrong_confidence = 0.0;
+  int right = 0, wrong = 0;
+  for (const Trial& trial : trials) {
+    if (trial.hypothesis) (trial.correct ? right : wrong) += 1;
+    if (trial.hypothesis) (trial.correct ? right_confidence : wrong_confidence) += trial.confidence;
+    if (!trial.object_shown) without_right += trial.correct;
+    if (!trial.object_shown) continue;
+    if (trial.rotation_rad < 15 * kDegree) near += 1, near_right += trial.correct;
+    if (trial.rotation_rad > 45 * kDegree) far += 1, far_right += trial.correct;
+  }
+  EXPECT_EQ(without_right, 0);
+  EXPECT_GT(near_right, 0.85 * near) << near;
+  EXPECT_LT(far_right, 0.75 * far) << far;
+  ASSERT_GT(right, 0);
+  ASSERT_GT(wrong, 0);
+
+  const measures::Measures measures = FitMeasures(trials, recogniser_);
+  EXPECT_GT(measures.predicted.HalfwayRotation(), 12.0 * kDegree);
+  EXPECT_LT(measures.predicted.HalfwayRotation(), 45.0 * kDegree);
+  EXPECT_GT(measures.observed.Probability(right_confidence / right), 0.75);
+  EXPECT_LT(measures.observed.Probability(wrong_confidence / wrong), 0.35);
+}
+
+TEST_F(BoardTrials, AreTheSameAgainAndViewByView) {
+  TrialParams params;
+  params.trials_per_view = 3;
+  params.negatives_per_view = 1;
+  params.seed = 5;
+  int calls = 0;
+  const auto progress = [&calls](int done, int of) {
+    ++calls;
+    EXPECT_LE(done, of);
+  };
+  const std::vector<Trial> all = RunTrials(object_, 0, backgrounds_, recogniser_, params, progress);
+  EXPECT_EQ(calls, static_cast<int>(all.size()));
+  const int last_view = static_cast<int>(object_.views.size()) - 1;
+  const std::vector<Trial> last = RunTrials(object_, last_view, backgrounds_, recogniser_, params);
+  ASSERT_EQ(last.size(), 4u);
+  for (std::size_t i = 0; i < last.size(); ++i) EXPECT_TRUE(Same(last[i], all[all.size() - 4 + i])) << i;
+  params.seed = 6;
+  EXPECT_FALSE(Same(RunTrials(object_, last_view, backgrounds_, recogniser_, params)[0], last[0]));
+  EXPECT_TRUE(RunTrials(object_, last_view + 1, backgrounds_, recogniser_, params).empty());
+}
+
+TEST_F(BoardTrials, WithoutBackgroundsTheyStillRun) {
+  TrialParams params;
+  params.trials_per_view = 4;
+  params.negatives_per_view = 1;
+  params.max_rotation_deg = 10.0;
+  params.max_image_noise = 4.0;
+  int right = 0;
+  for (const Trial& trial : RunTrials(object_, 2, {}, recogniser_, params)) right += trial.correct;
+  EXPECT_GE(right, 3);
+}
+
+}  // namespace
+}  // namespace vantage::assessment
