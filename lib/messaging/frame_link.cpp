@@ -1,0 +1,252 @@
+#include "messaging/frame_link.h"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+
+#include "messaging/channels.h"
+#include "messaging/geometry_messages.h"
+#include "rgbd/codec.h"
+
+namespace vantage::messaging {
+namespace {
+
+constexpr std::size_t kMaxPending = 8;  // Images waiting for parts or for their other half.
+constexpr std::int64_t kMaxLateness_us = 5000000;
+
+std::uint32_t BigEndian32(const unsigned char* bytes) {
+  return (std::uint32_t{bytes[0]} << 24) | (std::uint32_t{bytes[1]} << 16) | (std::uint32_t{bytes[2]} << 8) | bytes[3];
+}
+
+bool SameImage(const image_part_t& a, const image_part_t& b) {
+  return a.sequence == b.sequence && a.encoding == b.encoding && a.parts == b.parts && a.total_size == b.total_size &&
+         a.camera.width == b.camera.width && a.camera.height == b.camera.height;
+}
+
+std::string WhyNotAPart(const image_part_t& part) {
+  if (part.utime <= 0) return "an image without a capture time";
+  if (part.total_size < 1 || part.total_size > kMaxEncodedImageBytes) {
+    return "an image of " + std::to_string(part.total_size) + " bytes";
+  }
+  if (part.parts < 1 || part.part < 0 || part.part >= part.parts || part.size < 1 || part.size > part.total_size) {
+    return "part " + std::to_string(part.part) + " of " + std::to_string(part.parts) + " with " + std::to_string(part.size) +
+           " bytes";
+  }
+  return "";
+}
+
+template <typename Map>
+void Limit(Map& map) {
+  while (map.size() > kMaxPending) map.erase(map.begin());
+}
+
+Result<rgbd::Frame> Decode(const EncodedImage& color, const EncodedImage& depth) {
+  using Frame = Result<rgbd::Frame>;
+  const image_part_t& header = color.header;
+  const auto camera = FromMessage(header.camera);
+  if (!camera) return Frame::Error(camera.error);
+  rgbd::Frame frame;
+  frame.utime = header.utime;
+  frame.id = header.frame_id;
+  frame.camera = *camera;
+  if (header.T_world_camera_known) {
+    const auto pose = FromMessage(header.T_world_camera);
+    if (!pose) return Frame::Error(pose.error);
+    frame.T_world_camera = *pose;
+  }
+  try {
+    frame.color = rgbd::DecodeColor(color.bytes);
+    if (!depth.bytes.empty()) frame.depth = rgbd::DecodeDepth(depth.bytes);
+    rgbd::CheckFrame(frame);
+  } catch (const std::exception& error) {
+    return Frame::Error(error.what());
+  }
+  return frame;
+}
+
+}  // namespace
+
+template <>
+bool PlausibleBytes<image_part_t>(const void* data, std::uint32_t size) {
+  static const auto header_size = static_cast<std::uint32_t>([] {
+    image_part_t empty;
+    empty.size = 0;
+    return empty.getEncodedSize();
+  }());
+  if (size < header_size) return false;
+  return BigEndian32(static_cast<const unsigned char*>(data) + header_size - 4) == size - header_size;
+}
+
+void FrameSenderParams::Check() const {
+  if (jpeg_quality < 1 || jpeg_quality > 100) throw std::invalid_argument("jpeg_quality must be in 1..100");
+  if (max_part_bytes < 1000 || max_part_bytes > kMaxMessageBytes - 1000) {
+    throw std::invalid_argument("max_part_bytes must be in [1000, " + std::to_string(kMaxMessageBytes - 1000) + "]");
+  }
+}
+
+FrameSender::FrameSender(Bus& bus, const FrameSenderParams& params) : bus_(bus), params_(params) { params_.Check(); }
+
+std::int64_t FrameSender::Send(const rgbd::Frame& frame) {
+  rgbd::CheckFrame(frame);
+  image_part_t header;
+  header.utime = frame.utime;
+  header.sequence = next_sequence_++;
+  header.frame_id = frame.id;
+  header.with_depth = !frame.depth.empty();
+  header.camera = ToMessage(frame.camera);
+  header.T_world_camera_known = frame.T_world_camera.has_value();
+  header.T_world_camera = ToMessage(frame.T_world_camera.value_or(geometry::Rigid::Identity()));
+
+  header.encoding = image_part_t::JPEG;
+  for (const auto& part : SplitImage(header, rgbd::EncodeColor(frame.color, params_.jpeg_quality), params_.max_part_bytes)) {
+    bus_.Publish(kSensorColor, part);
+  }
+  if (header.with_depth) {
+    header.encoding = image_part_t::DEPTH_RVL;
+    for (const auto& part : SplitImage(header, rgbd::EncodeDepth(frame.depth), params_.max_part_bytes)) {
+      bus_.Publish(kSensorDepth, part);
+    }
+  }
+  return header.sequence;
+}
+
+std::vector<image_part_t> SplitImage(const image_part_t& header, const std::vector<std::uint8_t>& bytes, int max_part_bytes) {
+  const int total = static_cast<int>(bytes.size());
+  const int parts = std::max(1, (total + max_part_bytes - 1) / max_part_bytes);
+  std::vector<image_part_t> result;
+  for (int i = 0; i < parts; ++i) {
+    image_part_t part = header;
+    const auto first = bytes.begin() + static_cast<std::ptrdiff_t>(i) * max_part_bytes;
+    const auto last = i + 1 < parts ? first + max_part_bytes : bytes.end();
+    part.total_size = total;
+    part.part = static_cast<std::int16_t>(i);
+    part.parts = static_cast<std::int16_t>(parts);
+    part.data.assign(first, last);
+    part.size = static_cast<std::int32_t>(part.data.size());
+    result.push_back(std::move(part));
+  }
+  return result;
+}
+
+Result<std::optional<EncodedImage>> ImageAssembler::Add(const image_part_t& part) {
+  using Image = Result<std::optional<EncodedImage>>;
+  const std::string why = WhyNotAPart(part);
+  if (!why.empty()) return Image::Error(why);
+
+  auto [entry, is_new] = partials_.try_emplace(part.utime);
+  Partial& partial = entry->second;
+  if (is_new || !SameImage(partial.header, part)) {
+    partial.header = part;
+    partial.header.data.clear();
+    partial.header.size = 0;
+    partial.parts.assign(static_cast<std::size_t>(part.parts), {});
+    partial.missing = part.parts;
+  }
+  auto& slot = partial.parts[static_cast<std::size_t>(part.part)];
+  if (slot.empty()) --partial.missing;
+  slot = part.data;
+  if (partial.missing > 0) {
+    Limit(partials_);
+    return std::optional<EncodedImage>();
+  }
+
+  EncodedImage image;
+  image.header = partial.header;
+  for (const auto& piece : partial.parts) image.bytes.insert(image.bytes.end(), piece.begin(), piece.end());
+  partials_.erase(entry);
+  if (static_cast<std::int32_t>(image.bytes.size()) != image.header.total_size) {
+    return Image::Error("an image whose parts make " + std::to_string(image.bytes.size()) + " bytes instead of " +
+                        std::to_string(image.header.total_size));
+  }
+  return std::optional<EncodedImage>(std::move(image));
+}
+
+void ImageAssembler::DropUntil(std::int64_t utime) { partials_.erase(partials_.begin(), partials_.upper_bound(utime)); }
+
+FrameReceiver::FrameReceiver(Bus& bus)
+    : color_counts_(&bus.Subscribe<image_part_t>(kSensorColor, [this](const image_part_t& part) { OnPart(part, false); })),
+      depth_counts_(&bus.Subscribe<image_part_t>(kSensorDepth, [this](const image_part_t& part) { OnPart(part, true); })) {}
+
+void FrameReceiver::Refuse(const std::string& why) {
+  ++refused_;
+  last_refusal_ = why;
+}
+
+void FrameReceiver::OnPart(const image_part_t& part, bool is_depth) {
+  const std::string channel = is_depth ? kSensorDepth : kSensorColor;
+  const bool right_encoding = is_depth ? part.encoding == image_part_t::DEPTH_RVL
+                                       : part.encoding == image_part_t::JPEG || part.encoding == image_part_t::PNG;
+  if (!right_encoding) return Refuse(channel + ": encoding " + std::to_string(part.encoding) + " is not one for this channel");
+  if (frames_ > 0 && part.utime <= last_utime_) {
+    if (part.utime > last_utime_ - kMaxLateness_us) return;  // Late or doubled.
+    Restart();                                               // A log is played, or the sender's clock was set.
+  }
+
+  auto image = (is_depth ? depth_parts_ : color_parts_).Add(part);
+  if (!image) return Refuse(channel + ": " + image.error);
+  if (!*image) return;
+  auto& waiting = is_depth ? depths_ : colors_;
+  waiting[part.utime] = std::move(**image);
+  Limit(waiting);
+  Pair(part.utime);
+}
+
+void FrameReceiver::Restart() {
+  for (auto* parts : {&color_parts_, &depth_parts_}) parts->DropUntil(std::numeric_limits<std::int64_t>::max());
+  colors_.clear();
+  depths_.clear();
+  last_sequence_ = std::numeric_limits<std::int64_t>::max();
+  last_utime_ = 0;
+}
+
+void FrameReceiver::Pair(std::int64_t utime) {
+  const auto color = colors_.find(utime);
+  if (color == colors_.end()) return;
+  EncodedFrame frame;
+  if (color->second.header.with_depth) {
+    const auto depth = depths_.find(utime);
+    if (depth == depths_.end()) return;
+    frame.depth = std::move(depth->second);
+  }
+  frame.color = std::move(color->second);
+  Complete(std::move(frame));
+}
+
+void FrameReceiver::Complete(EncodedFrame frame) {
+  const image_part_t& header = frame.color.header;
+  const bool restarted = header.sequence <= last_sequence_;
+  if (frames_ > 0 && !restarted) gaps_ += header.sequence - last_sequence_ - 1;
+  last_sequence_ = header.sequence;
+  last_utime_ = header.utime;
+  ++frames_;
+
+  // Whatever is older can only be what was lost.
+  color_parts_.DropUntil(header.utime);
+  depth_parts_.DropUntil(header.utime);
+  colors_.erase(colors_.begin(), colors_.upper_bound(header.utime));
+  depths_.erase(depths_.begin(), depths_.upper_bound(header.utime));
+
+  if (newest_) ++skipped_;
+  newest_ = std::move(frame);
+}
+
+std::optional<ReceivedFrame> FrameReceiver::Take() {
+  if (!newest_) return std::nullopt;
+  const EncodedFrame encoded = std::move(*newest_);
+  newest_.reset();
+  auto frame = Decode(encoded.color, encoded.depth);
+  if (!frame) {
+    Refuse(std::string(kSensorColor) + ": frame " + std::to_string(encoded.color.header.sequence) + ": " + frame.error);
+    return std::nullopt;
+  }
+  return ReceivedFrame{std::move(*frame), encoded.color.header.sequence};
+}
+
+std::int64_t FrameReceiver::bad() const { return refused_ + color_counts_->bad + depth_counts_->bad; }
+
+std::string FrameReceiver::last_error() const {
+  if (!last_refusal_.empty()) return last_refusal_;
+  return color_counts_->last_error.empty() ? depth_counts_->last_error : color_counts_->last_error;
+}
+
+}  // namespace vantage::messaging

@@ -1,0 +1,160 @@
+#include "learner/node.h"
+
+#include <chrono>
+#include <stdexcept>
+#include <vantage/operator_command_t.hpp>
+
+#include "common/params.h"
+#include "messaging/channels.h"
+
+namespace vantage::learner {
+namespace {
+
+std::shared_ptr<const model::ObjectModel> LoadKnown(const model::Store& store, const std::string& name) {
+  auto known = store.Load(name);
+  return known && !known->views.empty() ? std::make_shared<const model::ObjectModel>(std::move(*known)) : nullptr;
+}
+
+bool Same(const messaging::ObjectMeasures& a, const messaging::ObjectMeasures& b) {
+  return a.utime == b.utime && a.views == b.views && a.completeness == b.completeness;
+}
+
+}  // namespace
+
+void LearnerNodeParams::Check() const {
+  if (object.empty()) throw std::invalid_argument("object must not be empty");
+  if (store.empty()) throw std::invalid_argument("store must not be empty");
+  if (!target_pixel.empty() && target_pixel.size() != 2) throw std::invalid_argument("target_pixel must be [u, v]");
+  if (!(scene_period_s > 0.0)) throw std::invalid_argument("scene_period_s must be > 0");
+  learner.Check();
+}
+
+LearnerNodeParams LoadLearnerNodeParams(const std::string& config_file, const std::string& library_file) {
+  LearnerNodeParams params;
+  if (!library_file.empty()) params.learner = params::LoadLibraryParams(library_file).learner;
+  if (config_file.empty()) return params;
+  auto yaml = config::Mapping::Load(config_file);
+  yaml.Get("object", params.object);
+  yaml.Get("store", params.store);
+  yaml.Get("target_pixel", params.target_pixel);
+  yaml.Get("scene_period_s", params.scene_period_s);
+  yaml.Finish();
+  yaml.Check(params);
+  return params;
+}
+
+LearnerNode::LearnerNode(messaging::Bus& bus, const LearnerNodeParams& params)
+    : Node(bus, "learner"),
+      params_((params.Check(), params)),
+      store_(params.store, model::Store::Mode::kWrite),
+      frames_(bus),
+      next_scene_us_(bus.now_us()) {
+  const auto known = LoadKnown(store_, params_.object);
+  if (known) stored_views_ = known->views.size();
+  learner_ = std::make_unique<learning::Learner>(params_.learner, params_.object, known);
+  Subscribe<measures_t>(messaging::kAssessorMeasures, [this](const measures_t& message) {
+    const auto measures = messaging::FromMessage(message);
+    if (!measures) return Refuse(messaging::kAssessorMeasures, measures.error);
+    OnMeasures(*measures);
+  });
+  Subscribe<operator_command_t>(messaging::kOperatorCommand, [this](const operator_command_t& message) {
+    if (!message.process.empty() && message.process != process()) return;
+    if (message.command == "pause") paused_ = true;
+    if (message.command == "resume") paused_ = false;
+  });
+}
+
+std::string LearnerNode::State() const { return paused_ ? "paused" : learning::ToString(last_.result.state); }
+
+std::string LearnerNode::Detail() const {
+  return params_.object + ", " + std::to_string(stored_views_) + " views in " + params_.store;
+}
+
+void LearnerNode::OnMeasures(const messaging::ObjectMeasures& measures) {
+  if (measures.object != params_.object || stored_views_ == 0) return;
+  if (saved_measures_ && Same(*saved_measures_, measures)) return;
+  if (!measures.measures.fingerprint.empty() && measures.measures.fingerprint != params_.learner.recogniser.Fingerprint()) {
+    return Refuse(messaging::kAssessorMeasures,
+                  "measures of " + measures.object +
+                      " were fitted for other recogniser settings: give learner and assessor the same "
+                      "--library file");
+  }
+  store_.SaveMeasures(measures.object, measures.measures, measures.completeness);
+  learner_->SetMeasures(measures.measures);
+  saved_measures_ = measures;
+  Count("measures");
+}
+
+void LearnerNode::Step() {
+  CountGaps(frames_.gaps());
+  CountSkipped(frames_.skipped());
+  if (!paused_) {
+    if (const auto received = frames_.Take()) Process(*received);
+  }
+  if (now_us() < next_scene_us_) return;
+  next_scene_us_ = now_us() + static_cast<std::int64_t>(params_.scene_period_s * 1e6);
+  PublishScene();
+}
+
+void LearnerNode::Process(const messaging::ReceivedFrame& received) {
+  const auto start = std::chrono::steady_clock::now();
+  learning::Target target;
+  if (params_.target_pixel.size() == 2) target.pixel = Eigen::Vector2d(params_.target_pixel[0], params_.target_pixel[1]);
+  last_.result = learner_->Process(received.frame, target);
+  const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
+  Count("frames");
+  if (last_.result.T_camera_object) Count("tracked");
+
+  last_.utime = received.frame.utime;
+  last_.sequence = received.sequence;
+  last_.object = params_.object;
+  last_.T_world_object = learner_->T_world_object();
+  const auto object = learner_->object();
+  last_.views = object ? static_cast<int>(object->views.size()) : 0;
+  last_.points = object ? static_cast<int>(object->points.size()) : 0;
+  last_.process_ms = elapsed.count();
+  NoteScene(received.frame, last_.result.view_added);
+  bus_.Publish(messaging::kLearnerTrack, messaging::ToMessage(last_));
+  StoreViews();
+}
+
+void LearnerNode::StoreViews() {
+  const auto object = learner_->object();
+  if (!object || object->views.size() <= stored_views_) return;
+  if (object->views.size() == stored_views_ + 1) {
+    store_.AddView(*object, static_cast<int>(stored_views_));
+  } else {
+    store_.SaveObject(*object);  // Writing failed before: all that is missing at once.
+  }
+  stored_views_ = object->views.size();
+  Count("views");
+  bus_.Publish(messaging::kLearnerView, messaging::ToMessage(messaging::NewestView(*object, params_.store)));
+}
+
+void LearnerNode::NoteScene(const rgbd::Frame& frame, bool view_added) {
+  if (!frame.T_world_camera) return;
+  if (view_added && learner_->plane()) {
+    scene_.Add(frame, *learner_->plane(), learner_->clusters());
+  } else if (scene_.empty() && last_.result.T_camera_object) {
+    // Going on with a known object: the learner did not need to segment.
+    const auto plane = segmentation::FitPlane(frame, params_.learner.plane);
+    if (!plane) return;
+    scene_.Add(frame, *plane, segmentation::FindClusters(frame, *plane, params_.learner.clusters));
+  } else {
+    return;
+  }
+  scene_utime_ = frame.utime;
+  next_scene_us_ = 0;
+}
+
+void LearnerNode::PublishScene() {
+  if (scene_.empty()) return;
+  messaging::Scene scene;
+  scene.utime = scene_utime_;
+  scene.object = params_.object;
+  scene.plane = scene_.plane_in_world();
+  scene.hulls = scene_.hulls();
+  bus_.Publish(messaging::kLearnerScene, messaging::ToMessage(scene));
+}
+
+}  // namespace vantage::learner

@@ -1,0 +1,67 @@
+// The learner: finds an object, tracks it, adds views and keeps the store. Its only writer.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "learner/scene_map.h"
+#include "learning/learner.h"
+#include "messaging/assessor_messages.h"
+#include "messaging/frame_link.h"
+#include "messaging/learner_messages.h"
+#include "messaging/node.h"
+#include "model/store.h"
+
+namespace vantage::learner {
+
+struct LearnerNodeParams {
+  std::string object = "object";     // What the object is called in the store; one that is there is learned further.
+  std::string store = "models.db";   // File; made where there is none.
+  std::vector<double> target_pixel;  // [u, v]: the object to learn is the cluster there; empty: the one nearest to the centre.
+  double scene_period_s = 1.0;       // LEARNER_SCENE is sent again so often; > 0.
+  learning::LearnerParams learner;
+
+  void Check() const;  // Throws std::invalid_argument naming the field.
+};
+
+// `config_file`: the fields above but `learner`, which is in `library_file`. Either may be empty. Throws std::runtime_error.
+LearnerNodeParams LoadLearnerNodeParams(const std::string& config_file, const std::string& library_file);
+
+class LearnerNode : public messaging::Node {
+ public:
+  // Opens the store. Throws std::runtime_error where it cannot be written.
+  LearnerNode(messaging::Bus& bus, const LearnerNodeParams& params);
+
+  void Step() override;
+  std::int64_t NextStep_us() const override { return next_scene_us_; }
+
+  const learning::Learner& learner() const { return *learner_; }
+
+ protected:
+  std::string State() const override;
+  std::string Detail() const override;
+
+ private:
+  void OnMeasures(const messaging::ObjectMeasures& measures);
+  void Process(const messaging::ReceivedFrame& received);
+  // Writes the views that are not in the store yet, and says so on LEARNER_VIEW.
+  void StoreViews();
+  void NoteScene(const rgbd::Frame& frame, bool view_added);
+  void PublishScene();
+
+  LearnerNodeParams params_;
+  model::Store store_;
+  messaging::FrameReceiver frames_;
+  std::unique_ptr<learning::Learner> learner_;
+  std::size_t stored_views_ = 0;
+  SceneMap scene_;
+  std::int64_t scene_utime_ = 0;
+  std::int64_t next_scene_us_ = 0;
+  messaging::Track last_;
+  std::optional<messaging::ObjectMeasures> saved_measures_;
+  bool paused_ = false;
+};
+
+}  // namespace vantage::learner
