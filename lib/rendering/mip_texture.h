@@ -10,18 +10,22 @@ namespace vantage::rendering {
 class MipTexture {
  public:
   MipTexture() = default;
-  // `texture` CV_8UC3 is shared, not copied; the smaller levels take a third of its memory.
+  // `texture` CV_8UC3, copied; with the smaller levels 4/3 of its memory.
   explicit MipTexture(const cv::Mat& texture);
 
   // The mean colour (BGR, 0 to 255) of the parallelogram that a pixel covers: `uv` its centre (v up, repeated beyond [0, 1]),
-  // `duv_dx` and `duv_dy` its edges. Trilinear along the short axis, up to 8 probes along the long one.
+  // `duv_dx` and `duv_dy` its edges. Trilinear across, up to 8 probes along the longer edge.
   Eigen::Vector3f Sample(const Eigen::Vector2f& uv, const Eigen::Vector2f& duv_dx, const Eigen::Vector2f& duv_dy) const;
 
  private:
-  Eigen::Vector3f Bilinear(int level, float u, float v_down) const;
-  Eigen::Vector3f Trilinear(float level, float u, float v_down) const;
-
-  std::vector<cv::Mat> levels_;
+  struct Level {
+    cv::Mat image;  // Has one row more than `rows`, so that four bytes can be read at every texel.
+    const std::uint8_t* data = nullptr;
+    std::size_t step = 0;
+    int columns = 0;
+    int rows = 0;
+  };
+  std::vector<Level> levels_;
 };
 
 }  // namespace vantage::rendering

@@ -23,7 +23,7 @@ constexpr float kMostSmoothing = 0.7f;  // cos of the angle beyond which a smoot
 struct Shape {
   std::shared_ptr<const Mesh> mesh;
   MipTexture texture;
-  std::vector<Eigen::Vector3f> normals;  // One per vertex, mean over its triangles by area.
+  std::vector<Eigen::Vector3f> normals;  // One per vertex, mean over its triangles by area; empty where all faces are flat.
   RTCScene scene = nullptr;
 
   Shape(RTCDevice device, std::shared_ptr<const Mesh> source);
@@ -52,7 +52,14 @@ std::vector<Eigen::Vector3f> VertexNormals(const Mesh& mesh) {
     for (int corner : {t[0], t[1], t[2]}) normals[corner] += area;
   }
   for (Eigen::Vector3f& normal : normals) normal.normalize();
-  return normals;
+  for (const Eigen::Vector3i& t : mesh.triangles) {
+    const Eigen::Vector3f& a = mesh.vertices[t[0]];
+    const Eigen::Vector3f face = (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a).normalized();
+    for (int corner : {t[0], t[1], t[2]}) {
+      if (normals[corner].dot(face) < 0.9999f) return normals;
+    }
+  }
+  return {};
 }
 
 Shape::Shape(RTCDevice device, std::shared_ptr<const Mesh> source) : mesh(std::move(source)) {
@@ -176,13 +183,16 @@ void Exposure::Cast(const float (*pixels)[2], int count, Hit* hits) const {
 float Exposure::Brightness(const Instance& instance, const Hit& hit, const Eigen::Vector3f& normal_in_mesh) const {
   if (!params_.shaded) return 1.0f;
   const Shape& shape = *instance.shape;
-  const Eigen::Vector3i& t = shape.mesh->triangles[hit.triangle];
-  Eigen::Vector3f smooth = (1 - hit.u - hit.v) * shape.normals[t[0]] + hit.u * shape.normals[t[1]] + hit.v * shape.normals[t[2]];
-  smooth.normalize();
-  if (smooth.dot(normal_in_mesh) < 0.0f) smooth = -smooth;  // Seen from behind.
-  if (!(smooth.dot(normal_in_mesh) > kMostSmoothing)) smooth = normal_in_mesh;
+  Eigen::Vector3f normal = normal_in_mesh;
+  if (!shape.normals.empty()) {
+    const Eigen::Vector3i& t = shape.mesh->triangles[hit.triangle];
+    Eigen::Vector3f smooth = (1 - hit.u - hit.v) * shape.normals[t[0]] + hit.u * shape.normals[t[1]] + hit.v * shape.normals[t[2]];
+    smooth.normalize();
+    if (smooth.dot(normal_in_mesh) < 0.0f) smooth = -smooth;  // Seen from behind.
+    if (smooth.dot(normal_in_mesh) > kMostSmoothing) normal = smooth;
+  }
   const float ambient = static_cast<float>(params_.ambient);
-  return ambient + (1.0f - ambient) * std::max(0.0f, light_.dot(instance.R_world_mesh * smooth));
+  return ambient + (1.0f - ambient) * std::max(0.0f, light_.dot(instance.R_world_mesh * normal));
 }
 
 // Colour of what was hit by the ray through pixel (x, y); `pixel_size` is the edge of the pixel's share that this ray stands for.
