@@ -103,7 +103,7 @@ int AtlasCell(const std::vector<cv::Mat>& faces) {
   int largest = 64;
   for (const cv::Mat& face : faces) largest = std::max({largest, face.cols, face.rows});
   int cell = 64;
-  while (cell < largest && cell < 2048) cell *= 2;
+  while (cell < largest && cell < 1024) cell *= 2;
   return cell;
 }
 

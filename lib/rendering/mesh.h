@@ -23,7 +23,7 @@ Mesh LoadMesh(const std::filesystem::path& file);
 
 // A box of the given size (metres) centred at the origin; each of the six faces (+x -x +y -y +z -z) wears the whole of the image of
 // the same index, upright along z (top and bottom: along y), seen from outside (indices wrap around; images are CV_8UC3 and may
-// differ in size; at least one).
+// differ in size; at least one; kept at 896 x 896 pixels at most).
 Mesh BoxMesh(const Eigen::Vector3d& size_m, const std::vector<cv::Mat>& faces);
 
 // A flat rectangle in the xy plane, centred, normal +z, wearing `texture` (upright towards +y) repeated every `tile_m` metres along

@@ -196,6 +196,11 @@ cv::Mat BopScene::LoadLabel(int id) const {
   return label;
 }
 
+std::optional<geometry::Rigid> BopScene::CameraPose(int id) const {
+  const auto found = cameras_.find(id);
+  return found == cameras_.end() ? std::nullopt : found->second.T_world_camera;
+}
+
 const std::vector<ObjectTruth>& BopScene::Truth(int id) const {
   static const std::vector<ObjectTruth> kNone;
   const auto found = truth_.find(id);

@@ -30,6 +30,9 @@ class BopScene {
   // Throws std::runtime_error naming the file: missing, not an image, depth of another size than colour, unknown id.
   Frame Load(int id) const;
 
+  // Where the camera was, without reading an image; nullopt where the recording does not know it or has no such frame.
+  std::optional<geometry::Rigid> CameraPose(int id) const;
+
   // Label image (CV_8UC1), empty where the scene has none.
   cv::Mat LoadLabel(int id) const;
 
