@@ -101,4 +101,20 @@ std::optional<model::ObjectModel> WithView(const model::ObjectModel& object, con
   return extended;
 }
 
+std::vector<pose::SurfacePoint> SurfaceOfView(const model::View& view, int count) {
+  std::vector<pose::SurfacePoint> surface;
+  if (view.keyframe.depth.empty()) return surface;
+  const geometry::Rigid T_object_camera = view.T_camera_object.inverse();
+  const int step = std::max(1, static_cast<int>(std::sqrt(double(cv::countNonZero(view.mask)) / std::max(1, count))));
+  for (int y = step / 2; y < view.mask.rows; y += step) {
+    for (int x = step / 2; x < view.mask.cols; x += step) {
+      if (!view.mask.at<uchar>(y, x)) continue;
+      const auto point = rgbd::PointAt(view.keyframe, {x, y}, 1);
+      const auto normal = rgbd::NormalAt(view.keyframe, {x, y});
+      if (point && normal) surface.push_back({T_object_camera * *point, T_object_camera.linear() * *normal});
+    }
+  }
+  return surface;
+}
+
 }  // namespace vantage::learning

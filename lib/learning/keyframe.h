@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "model/object_model.h"
+#include "pose/refine.h"
 #include "recognition/guided.h"
 #include "segmentation/clusters.h"
 
@@ -24,5 +25,8 @@ int ClusterOfObject(const std::vector<segmentation::Cluster>& clusters, const mo
 std::optional<model::ObjectModel> WithView(const model::ObjectModel& object, const rgbd::Frame& frame, const cv::Mat& mask,
                                            const features::Features& features, const geometry::Rigid& T_camera_object,
                                            const std::vector<recognition::GuidedMatch>& links, int min_points);
+
+// About `count` points of the surface that a view's depth image shows, object frame. Empty where it has no depth.
+std::vector<pose::SurfacePoint> SurfaceOfView(const model::View& view, int count);
 
 }  // namespace vantage::learning

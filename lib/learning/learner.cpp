@@ -49,6 +49,8 @@ void LearnerParams::Check() const {
   require(min_track_probability > 0.0 && min_track_probability < 1.0, "min_track_probability must be in (0, 1)");
   require(min_view_points >= 4, "min_view_points must be >= 4");
   require(min_view_angle_deg >= 0.0, "min_view_angle_deg must be >= 0");
+  require(surface_samples >= 0, "surface_samples must be >= 0");
+  require(surface_views >= 1, "surface_views must be >= 1");
   require(roi_margin >= 0.0, "roi_margin must be >= 0");
   require(max_mount_translation_m > 0.0, "max_mount_translation_m must be > 0");
   require(max_mount_rotation_deg > 0.0, "max_mount_rotation_deg must be > 0");
@@ -144,6 +146,27 @@ struct Learner::Impl {
     return mask;
   }
 
+  // The guided pose, drawn to the depth image by the surfaces of the nearest views.
+  geometry::Rigid OnSurface(const rgbd::Frame& frame, const features::Features& features,
+                            const recognition::GuidedPose& guided) const {
+    if (frame.depth.empty() || params.surface_samples == 0) return guided.T_camera_object;
+    std::vector<pose::Match2d3d> matches;
+    std::vector<int> all;
+    for (const recognition::GuidedMatch& match : guided.matches) {
+      const cv::Point2f& pixel = features.keypoints[match.keypoint].pt;
+      all.push_back(static_cast<int>(matches.size()));
+      matches.push_back({{pixel.x, pixel.y}, object->points[match.point].position, 0.0});
+    }
+    std::vector<pose::SurfacePoint> surface;
+    const std::vector<int> nearest = model::NearestViews(*object, guided.T_camera_object, params.surface_views);
+    for (const int view : nearest) {
+      const auto part = SurfaceOfView(object->views[view], params.surface_samples / static_cast<int>(nearest.size()));
+      surface.insert(surface.end(), part.begin(), part.end());
+    }
+    return pose::RefinePoseOnSurface(matches, all, surface, frame, guided.T_camera_object,
+                                     0.5 * params.recogniser.ransac.inlier_px);
+  }
+
   // Guided matches, confidence and p(o|c) at a pose.
   Track Judge(const rgbd::Frame& frame, features::Features features, const geometry::Rigid& T_camera_object, bool refine) const {
     Track track;
@@ -152,11 +175,11 @@ struct Learner::Impl {
     guided_params.radius_px = params.recogniser.guided_radius_px;
     guided_params.max_distance = params.recogniser.guided_max_distance;
     guided_params.inlier_px = params.recogniser.ransac.inlier_px;
-    const auto guided = recognition::MatchGuided(*object, T_camera_object, frame.camera, features, grid, guided_params);
-    track.matches = guided.matches;
-    track.T_camera_object = refine ? guided.T_camera_object : T_camera_object;
     rgbd::Frame query = frame;
     if (!params.recogniser.use_query_depth) query.depth = cv::Mat();
+    const auto guided = recognition::MatchGuided(*object, T_camera_object, query, features, grid, guided_params);
+    track.matches = guided.matches;
+    track.T_camera_object = refine ? OnSurface(query, features, guided) : T_camera_object;
     track.confidence = model::ObjectConfidence(*object, track.T_camera_object, query, grid, params.recogniser.confidence);
     track.probability = object->measures.observed.Probability(track.confidence.value);
     track.features = std::move(features);

@@ -26,6 +26,8 @@ struct LearnerParams {
       0.05;  // Where the mount's pose is known, a track that contradicts it by more is not trusted; > 0.
   double max_mount_rotation_deg = 10.0;
   bool require_mount_agreement = true;  // Use the check above where poses are known.
+  int surface_samples = 600;            // Points of the learned surface that are drawn to the depth image; 0 = none.
+  int surface_views = 2;                // ...taken from so many nearest views; >= 1.
   double roi_margin = 0.25;  // Interest points are sought this share of the object's size around where it is expected; >= 0.
 
   void Check() const;  // Throws std::invalid_argument naming the field.

@@ -26,6 +26,7 @@ struct RansacParams {
 struct Match2d3d {
   Eigen::Vector2d pixel;
   Eigen::Vector3d point;  // Object frame, metres.
+  double depth_m = 0.0;   // Measured depth (z) at the pixel, metres; 0 = none. Used by refinement only.
 };
 
 struct PoseEstimate {

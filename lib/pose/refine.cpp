@@ -25,6 +25,85 @@ geometry::Rigid Perturbed(const geometry::Rigid& T, const Vector6d& delta) {
   return step * T;
 }
 
+// Sums of a weighted least-squares problem in the six degrees of freedom of a pose.
+struct NormalEquations {
+  Matrix6d hessian = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  int matches = 0;
+
+  void Add(const Vector6d& jacobian, double residual, double weight) {
+    hessian.noalias() += weight * jacobian * jacobian.transpose();
+    gradient.noalias() += weight * residual * jacobian;
+  }
+};
+
+// Standard deviation of structured-light depth, metres.
+double DepthSigma(double depth_m) { return 0.0015 + 0.0025 * depth_m * depth_m; }
+
+double Cauchy(double squared, double scale) { return 1.0 / (1.0 + squared / (scale * scale)); }
+
+// A pixel of reprojection error weighs as much as a standard deviation of depth.
+void AddMatch(const Match2d3d& match, const geometry::PinholeCamera& camera, const geometry::Rigid& T, double scale_px,
+              NormalEquations* equations) {
+  const Eigen::Vector3d p = T * match.point;
+  if (!(p.z() > 1e-3)) return;
+  const double inverse_z = 1.0 / p.z();
+  const Eigen::Vector2d residual(camera.fx * p.x() * inverse_z + camera.cx - match.pixel.x(),
+                                 camera.fy * p.y() * inverse_z + camera.cy - match.pixel.y());
+  Eigen::Matrix<double, 2, 3> projection;
+  projection << camera.fx * inverse_z, 0, -camera.fx * p.x() * inverse_z * inverse_z, 0, camera.fy * inverse_z,
+      -camera.fy * p.y() * inverse_z * inverse_z;
+  Eigen::Matrix<double, 2, 6> jacobian;
+  jacobian.leftCols<3>() = projection;
+  jacobian.rightCols<3>() = -projection * Cross(p);
+  const double weight = Cauchy(residual.squaredNorm(), scale_px);
+  for (int axis = 0; axis < 2; ++axis) equations->Add(jacobian.row(axis).transpose(), residual(axis), weight);
+  ++equations->matches;
+  if (match.depth_m <= 0.0) return;
+  const double inverse_sigma = 1.0 / DepthSigma(match.depth_m);
+  const double error = (p.z() - match.depth_m) * inverse_sigma;
+  Vector6d depth_jacobian;
+  depth_jacobian << 0, 0, 1, p.y(), -p.x(), 0;
+  equations->Add(depth_jacobian * inverse_sigma, error, Cauchy(error * error, 2.0));
+}
+
+// Point to plane against the depth image. Neighbouring depths err together, so that a sample weighs less than a match.
+void AddSurface(const SurfacePoint& sample, const rgbd::Frame& frame, const geometry::Rigid& T, NormalEquations* equations) {
+  constexpr double kMaxDistance = 0.02;
+  constexpr double kSampleWeight = 0.25;
+  const Eigen::Vector3d p = T * sample.point;
+  const Eigen::Vector3d normal = T.linear() * sample.normal;
+  if (normal.dot(p.normalized()) > -0.2) return;  // Seen at a grazing angle or from behind.
+  const auto pixel = frame.camera.Project(p);
+  if (!pixel || !frame.camera.Contains(*pixel)) return;
+  const auto measured = rgbd::PointAt(frame, *pixel, 1);
+  if (!measured) return;
+  const double distance = normal.dot(p - *measured);
+  if (std::abs(distance) > kMaxDistance) return;
+  const double inverse_sigma = 1.0 / DepthSigma(measured->z());
+  Vector6d jacobian;
+  jacobian << normal, p.cross(normal);
+  const double error = distance * inverse_sigma;
+  equations->Add(jacobian * inverse_sigma, error, kSampleWeight * Cauchy(error * error, 2.0));
+}
+
+// `add` puts all residuals at a pose into the equations.
+template <typename AddAll>
+geometry::Rigid GaussNewton(const geometry::Rigid& start, int iterations, const AddAll& add) {
+  geometry::Rigid T = start;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    NormalEquations equations;
+    add(T, &equations);
+    if (equations.matches < 3) return start;
+    equations.hessian.diagonal() *= 1.0 + 1e-6;
+    const Vector6d delta = -equations.hessian.ldlt().solve(equations.gradient);
+    if (!delta.allFinite()) return start;
+    T = Perturbed(T, delta);
+    if (delta.norm() < 1e-8) break;
+  }
+  return T;
+}
+
 }  // namespace
 
 double ReprojectionError(const Match2d3d& match, const geometry::PinholeCamera& camera, const geometry::Rigid& T_camera_object) {
@@ -35,36 +114,18 @@ double ReprojectionError(const Match2d3d& match, const geometry::PinholeCamera& 
 geometry::Rigid RefinePose(const std::vector<Match2d3d>& matches, const std::vector<int>& index,
                            const geometry::PinholeCamera& camera, const geometry::Rigid& T_camera_object, double scale_px,
                            int iterations) {
-  geometry::Rigid T = T_camera_object;
-  for (int iteration = 0; iteration < iterations; ++iteration) {
-    Matrix6d hessian = Matrix6d::Zero();
-    Vector6d gradient = Vector6d::Zero();
-    int used = 0;
-    for (const int i : index) {
-      const Eigen::Vector3d p = T * matches[i].point;
-      if (!(p.z() > 1e-3)) continue;
-      const double inverse_z = 1.0 / p.z();
-      const Eigen::Vector2d residual(camera.fx * p.x() * inverse_z + camera.cx - matches[i].pixel.x(),
-                                     camera.fy * p.y() * inverse_z + camera.cy - matches[i].pixel.y());
-      Eigen::Matrix<double, 2, 3> projection;
-      projection << camera.fx * inverse_z, 0, -camera.fx * p.x() * inverse_z * inverse_z, 0, camera.fy * inverse_z,
-          -camera.fy * p.y() * inverse_z * inverse_z;
-      Eigen::Matrix<double, 2, 6> jacobian;
-      jacobian.leftCols<3>() = projection;
-      jacobian.rightCols<3>() = -projection * Cross(p);
-      const double weight = 1.0 / (1.0 + residual.squaredNorm() / (scale_px * scale_px));
-      hessian.noalias() += weight * jacobian.transpose() * jacobian;
-      gradient.noalias() += weight * jacobian.transpose() * residual;
-      ++used;
-    }
-    if (used < 3) return T_camera_object;
-    hessian.diagonal() *= 1.0 + 1e-6;
-    const Vector6d delta = -hessian.ldlt().solve(gradient);
-    if (!delta.allFinite()) return T_camera_object;
-    T = Perturbed(T, delta);
-    if (delta.norm() < 1e-8) break;
-  }
-  return T;
+  return GaussNewton(T_camera_object, iterations, [&](const geometry::Rigid& T, NormalEquations* equations) {
+    for (const int i : index) AddMatch(matches[i], camera, T, scale_px, equations);
+  });
+}
+
+geometry::Rigid RefinePoseOnSurface(const std::vector<Match2d3d>& matches, const std::vector<int>& index,
+                                    const std::vector<SurfacePoint>& surface, const rgbd::Frame& frame,
+                                    const geometry::Rigid& T_camera_object, double scale_px, int iterations) {
+  return GaussNewton(T_camera_object, iterations, [&](const geometry::Rigid& T, NormalEquations* equations) {
+    for (const int i : index) AddMatch(matches[i], frame.camera, T, scale_px, equations);
+    for (const SurfacePoint& sample : surface) AddSurface(sample, frame, T, equations);
+  });
 }
 
 }  // namespace vantage::pose

@@ -12,10 +12,23 @@ namespace vantage::pose {
 // Reprojection error of a match, pixels; +inf behind the camera.
 double ReprojectionError(const Match2d3d& match, const geometry::PinholeCamera& camera, const geometry::Rigid& T_camera_object);
 
-// Minimises the Cauchy-weighted reprojection error of the matches `index` by Gauss-Newton. `scale_px` is the error at which a match
-// weighs half. Returns the start where fewer than 3 matches are usable. Cost: about 10 us an iteration at 100 matches.
+// Minimises the Cauchy-weighted reprojection error of the matches `index`, and the depth error of those that have a measured depth,
+// by Gauss-Newton. `scale_px` is the error at which a match weighs half. Returns the start where fewer than 3 matches are usable.
+// Cost: about 10 us an iteration at 100 matches.
 geometry::Rigid RefinePose(const std::vector<Match2d3d>& matches, const std::vector<int>& index,
                            const geometry::PinholeCamera& camera, const geometry::Rigid& T_camera_object, double scale_px,
                            int iterations = 10);
+
+// A point of the object's surface; object frame, metres, unit normal outward.
+struct SurfacePoint {
+  Eigen::Vector3d point;
+  Eigen::Vector3d normal;
+};
+
+// As above, and the surface is drawn to the frame's depth image (point to plane, projective association; samples further than 2 cm
+// from it do not count). The start must be within a centimetre or so.
+geometry::Rigid RefinePoseOnSurface(const std::vector<Match2d3d>& matches, const std::vector<int>& index,
+                                    const std::vector<SurfacePoint>& surface, const rgbd::Frame& frame,
+                                    const geometry::Rigid& T_camera_object, double scale_px, int iterations = 10);
 
 }  // namespace vantage::pose

@@ -42,25 +42,26 @@ std::map<int, std::pair<double, GuidedMatch>> Partners(const model::ObjectModel&
 
 }  // namespace
 
-GuidedPose MatchGuided(const model::ObjectModel& object, const geometry::Rigid& T_camera_object,
-                       const geometry::PinholeCamera& camera, const features::Features& features, const model::KeypointGrid& grid,
-                       const GuidedParams& params) {
+GuidedPose MatchGuided(const model::ObjectModel& object, const geometry::Rigid& T_camera_object, const rgbd::Frame& frame,
+                       const features::Features& features, const model::KeypointGrid& grid, const GuidedParams& params) {
   GuidedPose result;
   result.T_camera_object = T_camera_object;
   for (const double radius_px : {params.radius_px, 0.5 * params.radius_px + params.inlier_px}) {
     std::vector<pose::Match2d3d> matches;
     std::vector<GuidedMatch> sources;
-    for (const auto& [keypoint, partner] : Partners(object, result.T_camera_object, camera, features, grid, radius_px, params)) {
+    for (const auto& [keypoint, partner] :
+         Partners(object, result.T_camera_object, frame.camera, features, grid, radius_px, params)) {
       const cv::Point2f& pixel = features.keypoints[keypoint].pt;
-      matches.push_back({{pixel.x, pixel.y}, object.points[partner.second.point].position});
+      const double depth_m = rgbd::DepthAt(frame, {pixel.x, pixel.y}).value_or(0.0);
+      matches.push_back({{pixel.x, pixel.y}, object.points[partner.second.point].position, depth_m});
       sources.push_back(partner.second);
     }
     std::vector<int> all(matches.size());
     std::iota(all.begin(), all.end(), 0);
-    result.T_camera_object = pose::RefinePose(matches, all, camera, result.T_camera_object, 0.5 * params.inlier_px);
+    result.T_camera_object = pose::RefinePose(matches, all, frame.camera, result.T_camera_object, 0.5 * params.inlier_px);
     result.matches.clear();
     for (size_t i = 0; i < matches.size(); ++i) {
-      if (pose::ReprojectionError(matches[i], camera, result.T_camera_object) < params.inlier_px)
+      if (pose::ReprojectionError(matches[i], frame.camera, result.T_camera_object) < params.inlier_px)
         result.matches.push_back(sources[i]);
     }
   }

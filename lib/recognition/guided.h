@@ -29,9 +29,9 @@ struct GuidedPose {
   std::vector<GuidedMatch> matches;  // Those that support the refined pose; each keypoint once.
 };
 
+// `frame` gives the camera and, where it has depth, the measured depth that refinement uses as well.
 // Two rounds of matching and refinement from `T_camera_object`. Points that face away by more than 80 degrees are left out.
-GuidedPose MatchGuided(const model::ObjectModel& object, const geometry::Rigid& T_camera_object,
-                       const geometry::PinholeCamera& camera, const features::Features& features, const model::KeypointGrid& grid,
-                       const GuidedParams& params);
+GuidedPose MatchGuided(const model::ObjectModel& object, const geometry::Rigid& T_camera_object, const rgbd::Frame& frame,
+                       const features::Features& features, const model::KeypointGrid& grid, const GuidedParams& params);
 
 }  // namespace vantage::recognition

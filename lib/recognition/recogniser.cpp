@@ -140,7 +140,7 @@ struct Recogniser::Impl {
   std::optional<Detection> Verify(const Known& known, const rgbd::Frame& frame, const features::Features& features,
                                   const model::KeypointGrid& grid, const geometry::Rigid& T_camera_object) const {
     const GuidedParams guided_params{params.guided_radius_px, params.guided_max_distance, params.ransac.inlier_px, 4};
-    const GuidedPose guided = MatchGuided(*known.object, T_camera_object, frame.camera, features, grid, guided_params);
+    const GuidedPose guided = MatchGuided(*known.object, T_camera_object, frame, features, grid, guided_params);
     if (static_cast<int>(guided.matches.size()) < params.min_inliers) return std::nullopt;
     Detection detection;
     detection.object = known.object->name;
