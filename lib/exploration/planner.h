@@ -1,9 +1,18 @@
 // Where to look next: scores candidate views by expected gain minus what the trip costs (section V-C, equation 14), and knows when
-// to stop.
+// to stop. The caller's loop:
+//
+//   auto strategy = MakeStrategy("planner", params, seed);
+//   while (true) {
+//     const Decision decision = strategy->Decide(belief, candidates, T_world_camera, mount, elapsed_s);
+//     if (decision.chosen < 0) break;  // decision.stop says why.
+//     ... move along decision.candidates[decision.chosen].path, try to learn there, bring the belief up to date ...
+//     strategy->Report(attempt);
+//   }
 #pragma once
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,16 +23,17 @@
 namespace vantage::exploration {
 
 struct PlannerParams {
-  double worth_s = 600.0;                // Seconds a full unit of detection probability is worth to this robot; > 0.
+  double worth_s = 600.0;                // Seconds that raising completeness from 0 to 1 is worth to this robot; > 0.
   double target_completeness = 0.97;     // Stop here; (0, 1].
   double min_detect_probability = 0.25;  // Learning attempts less likely than this are not made; [0, 1).
-  double t_plan_s = 0.5;                 // First guess of the time one decision takes; >= 0.
-  double t_learn_s = 1.0;                // First guess of the time one learning attempt takes; >= 0.
+  double t_plan_s = 0.5;                 // First guess of the time one decision takes; >= 0. The mean of...
+  double t_learn_s = 1.0;                // ...guess and reports is used. Likewise of one learning attempt.
   double time_budget_s = 900.0;          // Stop when that much robot time has passed; > 0.
   int max_attempts = 60;                 // Stop after so many learning attempts; >= 1.
-  double failure_radius_rad = 0.17;      // A failed attempt lowers the belief in views this near to it...
-  double failure_discount = 0.3;         // ...by this factor each time, until the model changes; [0, 1).
-  int max_path_goals = 200;              // Only so many candidates (best expected gain first) get their path planned; >= 1.
+  double failure_radius_rad = 0.17;      // An attempt that added no view lowers the belief in views this near to it; >= 0...
+  double failure_discount = 0.3;         // ...by this factor each time, until some view is added; [0, 1).
+  int max_path_goals = 200;              // Paths are planned for so many candidates at once, greatest worth * P * gain first, and
+                                         // for more only while none of those is worth its trip; >= 1.
   measures::CompletenessRule rule = measures::CompletenessRule::kMax;
 
   void Check() const;  // Throws std::invalid_argument naming the field.
@@ -31,7 +41,7 @@ struct PlannerParams {
 
 // A pose the camera could go to. Candidates come from the world (sampled around the object, or the recorded views).
 struct CandidateView {
-  int id = 0;  // The caller's own number.
+  int id = 0;  // The caller's own number: the same view of the object keeps it from decision to decision.
   geometry::Rigid T_world_camera = geometry::Rigid::Identity();
   measures::Viewpoint viewpoint;  // The same as seen from the object (object coordinates).
 };
@@ -39,22 +49,33 @@ struct CandidateView {
 // A candidate with everything the decision was made of: a user can see why.
 struct Candidate {
   CandidateView view;
-  double detect_probability = 0.0;  // Equation (12), lowered by failures near by.
-  double gain = 0.0;                // Equation (14): completeness with this view added minus completeness now.
-  std::optional<motion::Trajectory> path;
+  double detect_probability = 0.0;         // P(detect): (12) over the learned views, lowered by failures near by.
+  double gain = 0.0;                       // Equation (14): completeness with this view added minus completeness now.
+  std::optional<motion::Trajectory> path;  // World; only where it was planned and found.
   double t_plan_s = 0.0;
   double t_move_s = 0.0;
   double t_learn_s = 0.0;
-  double utility_s = -std::numeric_limits<double>::infinity();  // worth * P(detect) * gain - (t_plan + t_move + t_learn).
-  std::string refusal;                                          // Why it was not considered; empty where it was.
+  // worth_s * P(detect) * gain - (t_plan + t_move + t_learn); -infinity without a path.
+  double utility_s = -std::numeric_limits<double>::infinity();
+  // Why it was not considered; empty where it was. "too unlikely to detect", "no gain", the mount's words ("in collision", "out of
+  // the workspace", "no path found", ...), "path not planned" (see max_path_goals); by random also "already tried".
+  std::string refusal;
 };
 
-enum class StopReason { kNone, kTargetReached, kNothingWorthwhile, kNothingReachable, kTimeBudget, kMaxAttempts, kOperator };
-std::string ToString(StopReason reason);  // "target_reached", "nothing_worth_its_cost", "nothing_reachable", ...
+enum class StopReason {
+  kNone,               // "none": go on.
+  kTargetReached,      // "target_reached"
+  kNothingWorthwhile,  // "nothing_worth_its_cost"
+  kNothingReachable,   // "nothing_reachable": the mount refuses all that would be worth an attempt; random: nothing is left.
+  kTimeBudget,         // "time_budget"
+  kMaxAttempts,        // "max_attempts"
+  kOperator            // "operator": never by a strategy; for callers who are told to stop.
+};
+std::string ToString(StopReason reason);
 
 struct Decision {
-  std::vector<Candidate> candidates;
-  int chosen = -1;  // Index into candidates; -1 = stop.
+  std::vector<Candidate> candidates;  // As given, in the same order; empty where target, time or attempts stop it anyway.
+  int chosen = -1;                    // Index into candidates; -1 = stop.
   StopReason stop = StopReason::kNone;
   double completeness = 0.0;  // Now, by params.rule.
 };
@@ -64,47 +85,52 @@ struct Attempt {
   measures::Viewpoint viewpoint;
   bool detected = false;  // The object was found and tracked there.
   bool view_added = false;
-  double t_plan_s = 0.0;  // What it really took.
-  double t_learn_s = 0.0;
+  double t_plan_s = 0.0;   // What it really took; >= 0.
+  double t_learn_s = 0.0;  // Likewise.
 };
 
 // What the planner knows of the object's model.
 struct Belief {
   std::vector<measures::Viewpoint> views;  // Learned so far.
   measures::PredictedSuccess predicted;
-  std::vector<measures::WeightedViewpoint> reachable;  // p(theta): where the object may be seen from.
+  std::vector<measures::WeightedViewpoint> reachable;  // p(theta): where the object may be seen from; completeness is over these.
 };
 
-// Chooses the next view. Strategies share candidates, paths, failure memory and stopping by time; they differ in the choice.
+// Chooses the next view. Strategies share scores, costs, failure memory and stopping by target, time and attempts (asked in this
+// order); they differ in the choice. Same params, seed and calls, same decisions. Not thread-safe.
 class Strategy {
  public:
   virtual ~Strategy() = default;
 
-  // Plans from where the camera is. `elapsed_s` is robot time since the start.
+  // Plans from where the camera is. `elapsed_s` is robot time since the start. Asking again without a Report in between gives the
+  // same answer. Cost: candidates x reachable evaluations of (12), 5 ms for 200 x 500, and the mount's planning.
   virtual Decision Decide(const Belief& belief, const std::vector<CandidateView>& candidates, const geometry::Rigid& T_world_camera,
                           const motion::Mount& mount, double elapsed_s) = 0;
 
-  // Told after every attempt.
+  // To be told after every attempt at the view chosen last, also where the camera did not get there or saw nothing. Throws
+  // std::invalid_argument where a time is negative or not finite.
   virtual void Report(const Attempt& attempt) = 0;
 };
 
-// "planner": utility as above. "random": any reachable candidate not yet tried, uniformly (same budget, same target; never stops
-// for cost). Throws std::invalid_argument on another name.
+// "planner": the greatest utility, and stops where none is > 0. "random": any reachable candidate whose id was not tried yet,
+// uniformly; never stops for cost and does not ask min_detect_probability: the baseline. Throws std::invalid_argument on another
+// name and what params.Check() throws.
 std::unique_ptr<Strategy> MakeStrategy(const std::string& name, const PlannerParams& params, std::uint32_t seed);
 
-// Candidate views around an object: `count` even directions between the elevations times the distances, looking at the object's
-// centre, image up towards +z of the world.
+// Candidate views around an object: even directions between the elevations times the distances, looking at the object's origin,
+// image up towards +z of the world. Directions are even in the object's coordinates and ids name direction and distance, so a
+// better pose of the object moves the candidates but keeps their ids; elevations are the world's.
 struct CandidateParams {
-  int directions = 120;             // >= 1, over the whole sphere before the elevation cut.
-  double min_elevation_rad = 0.17;  // Above the table plane.
-  double max_elevation_rad = 1.4;
-  std::vector<double> distances_m = {0.6};  // Each > 0.
+  int directions = 120;                     // >= 1, over the whole sphere before the elevation cut.
+  double min_elevation_rad = 0.17;          // Above the world's horizontal; [-pi/2, max_elevation_rad].
+  double max_elevation_rad = 1.4;           // <= pi/2.
+  std::vector<double> distances_m = {0.6};  // At least one, each > 0.
 
-  void Check() const;
+  void Check() const;  // Throws std::invalid_argument naming the field.
 };
 std::vector<CandidateView> SampleCandidates(const geometry::Rigid& T_world_object, const CandidateParams& params);
 
-// The viewpoint of a camera pose relative to an object.
+// The viewpoint of a camera pose relative to an object. Throws std::invalid_argument where the camera is at the object's origin.
 measures::Viewpoint ViewpointOf(const geometry::Rigid& T_world_camera, const geometry::Rigid& T_world_object);
 
 }  // namespace vantage::exploration
