@@ -17,6 +17,7 @@ void Fields(Visitor& visit, features::FeatureParams& params) {
 template <typename Visitor>
 void Fields(Visitor& visit, model::ConfidenceParams& params) {
   visit("support_px", params.support_px);
+  visit("max_scale_ratio", params.max_scale_ratio);
   visit("max_incidence_deg", params.max_incidence_deg);
   visit("occlusion_m", params.occlusion_m);
   visit("min_points", params.min_points);
