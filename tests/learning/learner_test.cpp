@@ -1,0 +1,139 @@
+// The learner and the recogniser on real recordings.
+#include "learning/learner.h"
+
+#include <gtest/gtest.h>
+
+#include "rgbd/bop.h"
+#include "support/data.h"
+
+namespace vantage::learning {
+namespace {
+
+// The shelf_box recording's frames without the recording's poses: the learner tracks on its own.
+std::vector<rgbd::Frame> ShelfFrames(int count) {
+  const rgbd::BopScene scene(testing::DataFolder() / "shelf_box");
+  std::vector<rgbd::Frame> frames;
+  for (int i = 0; i < count; ++i) {
+    frames.push_back(scene.Load(scene.ids()[i]));
+  }
+  return frames;
+}
+
+rgbd::Frame WithoutPose(rgbd::Frame frame) {
+  frame.T_world_camera.reset();
+  return frame;
+}
+
+TEST(Learner, TracksARealObjectAndAgreesWithTheCamerasMotion) {
+  VANTAGE_NEEDS_DATA("shelf_box");
+  const auto frames = ShelfFrames(8);
+  Learner learner(LearnerParams{}, "carton");
+  const LearnerResult first = learner.Process(WithoutPose(frames[0]));
+  ASSERT_TRUE(first.view_added) << first.note;
+  EXPECT_GT(learner.object()->points.size(), 50u);
+  for (size_t i = 1; i < frames.size(); ++i) {
+    const LearnerResult result = learner.Process(WithoutPose(frames[i]));
+    ASSERT_EQ(result.state, State::kTracking) << "frame " << i << ": " << result.note;
+    const geometry::Rigid expected = frames[i].T_world_camera->inverse() * *frames[0].T_world_camera * *first.T_camera_object;
+    EXPECT_LT(geometry::Difference(*result.T_camera_object, expected).translation_m, 0.015);
+    EXPECT_GE(result.probability, 0.5);
+  }
+}
+
+TEST(Learner, LosesACoveredObjectLearnsNothingAndFindsItAgain) {
+  VANTAGE_NEEDS_DATA("shelf_box");
+  const auto frames = ShelfFrames(4);
+  Learner learner(LearnerParams{}, "carton");
+  learner.Process(WithoutPose(frames[0]));
+  learner.Process(WithoutPose(frames[1]));
+  const size_t views = learner.object()->views.size();
+  rgbd::Frame covered = WithoutPose(frames[2]);
+  covered.color = cv::Mat::zeros(covered.color.size(), CV_8UC3);
+  covered.depth = cv::Mat::zeros(covered.depth.size(), CV_16UC1);
+  for (int i = 0; i < 2; ++i) {
+    const LearnerResult result = learner.Process(covered);
+    EXPECT_TRUE(result.state == State::kRelocalising || result.state == State::kLost);
+    EXPECT_FALSE(result.T_camera_object.has_value());
+    EXPECT_FALSE(result.note.empty());
+  }
+  EXPECT_EQ(learner.object()->views.size(), views);
+  EXPECT_EQ(learner.Process(WithoutPose(frames[3])).state, State::kTracking);
+}
+
+TEST(Learner, RefusesATrackThatContradictsTheMount) {
+  VANTAGE_NEEDS_DATA("shelf_box");
+  auto frames = ShelfFrames(3);
+  Learner learner(LearnerParams{}, "carton");
+  learner.Process(frames[0]);
+  ASSERT_TRUE(learner.T_world_object().has_value());
+  EXPECT_EQ(learner.Process(frames[1]).state, State::kTracking);
+  frames[2].T_world_camera->translation() += Eigen::Vector3d(0.1, 0, 0);  // The object was moved, or the mount is wrong.
+  const LearnerResult result = learner.Process(frames[2]);
+  EXPECT_NE(result.state, State::kTracking);
+  EXPECT_NE(result.note.find("mount"), std::string::npos) << result.note;
+}
+
+TEST(Learner, ContinuesAKnownModelWithoutANewOne) {
+  VANTAGE_NEEDS_DATA("shelf_box");
+  const auto frames = ShelfFrames(3);
+  Learner first(LearnerParams{}, "carton");
+  first.Process(WithoutPose(frames[0]));
+  Learner second(LearnerParams{}, "carton", first.object());
+  const LearnerResult result = second.Process(WithoutPose(frames[2]));
+  EXPECT_EQ(result.state, State::kTracking) << result.note;
+  EXPECT_GE(second.object()->views.size(), first.object()->views.size());
+}
+
+TEST(Learner, SaysWhyThereIsNothingToLearn) {
+  rgbd::Frame frame;
+  frame.camera = {64, 48, 50, 50, 31.5, 23.5};
+  frame.color = cv::Mat::zeros(48, 64, CV_8UC3);
+  Learner learner(LearnerParams{}, "x");
+  EXPECT_EQ(learner.Process(frame).note, "no depth");
+  EXPECT_EQ(learner.object(), nullptr);
+  frame.depth = cv::Mat::zeros(24, 32, CV_16UC1);
+  EXPECT_THROW(learner.Process(frame), std::invalid_argument);
+  LearnerParams params;
+  params.new_view_confidence = 2.0;
+  EXPECT_THROW(params.Check(), std::invalid_argument);
+}
+
+// The cracker box from two photographs at known poses, found in one between them; not in a picture without it.
+TEST(Recogniser, FindsTheRealBoxAndOnlyWhereItIs) {
+  VANTAGE_NEEDS_DATA("board");
+  VANTAGE_NEEDS_DATA("osd");
+  const rgbd::BopScene scene(testing::DataFolder() / "board");
+  const auto truth = [&](int id) {
+    for (const auto& object : scene.Truth(id)) {
+      if (object.object_id == 3) return object.T_camera_object;
+    }
+    throw std::runtime_error("no truth");
+  };
+  LearnerParams params;
+  params.recogniser.use_query_depth = false;
+  Learner learner(params, "box");
+  const rgbd::Frame first = scene.Load(132);
+  Target target;
+  target.pixel = first.camera.Project(truth(132).translation());
+  ASSERT_TRUE(learner.Process(first, target).view_added);
+  const geometry::Rigid T_mesh_object = truth(132).inverse() * learner.object()->views[0].T_camera_object;
+
+  recognition::Recogniser recogniser(params.recogniser);
+  recogniser.Set(learner.object());
+  const rgbd::Frame query = scene.Load(46);
+  const auto found = recogniser.Recognise(query, recogniser.Extract(query));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_GE(found[0].probability, 0.5);
+  EXPECT_LT(model::MeanPointDistance(learner.object()->PointMatrix(), found[0].T_camera_object, truth(46) * T_mesh_object), 0.04);
+
+  const rgbd::BopScene elsewhere(testing::DataFolder() / "osd");
+  const rgbd::Frame without = elsewhere.Load(0);
+  for (const auto& detection : recogniser.Recognise(without, recogniser.Extract(without))) EXPECT_LT(detection.probability, 0.5);
+
+  recognition::RecogniserParams other = params.recogniser;
+  other.features.contrast_threshold *= 2;
+  EXPECT_THROW(recognition::Recogniser(other).Set(learner.object()), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace vantage::learning
