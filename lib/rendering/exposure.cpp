@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kLanes = 8;
 constexpr float kMostSmoothing = 0.7f;  // cos of the angle beyond which a smoothed normal is not believed (a real edge).
-constexpr float kEdge = 0.9f;           // |cos| of the angle between neighbouring pixels' normals below which there is an edge.
+constexpr int kEdge = 14500;            // Normals of length 127: the cosine, 0.9, below which there is an edge between neighbours.
 
 cv::Vec3b ToPixel(const Eigen::Vector3f& color) {
   return {cv::saturate_cast<std::uint8_t>(color[0]), cv::saturate_cast<std::uint8_t>(color[1]),
@@ -27,7 +27,7 @@ Exposure::Exposure(RTCScene scene, const std::vector<Instance>& instances, const
       R_world_camera_(T_world_camera.linear().cast<float>()),
       eye_in_world_(T_world_camera.translation().cast<float>()),
       light_(params.light_in_world.normalized().cast<float>()),
-      normals_(camera.height, camera.width, CV_32FC3) {
+      surfaces_(static_cast<std::size_t>(camera.width) * camera.height) {
   for (const Instance& instance : instances) R_mesh_camera_.push_back(instance.R_world_mesh.transpose() * R_world_camera_);
 }
 
@@ -35,24 +35,29 @@ Exposure::Exposure(RTCScene scene, const std::vector<Instance>& instances, const
 void Exposure::Cast(const float (*pixels)[2], int count, Hit* hits) const {
   RTCRayHit8 packet;
   alignas(32) int valid[kLanes];
+  const float cx = static_cast<float>(camera_.cx), per_fx = 1.0f / static_cast<float>(camera_.fx);
+  const float cy = static_cast<float>(camera_.cy), per_fy = 1.0f / static_cast<float>(camera_.fy);
+  const Eigen::Matrix3f& R = R_world_camera_;
+  alignas(32) float x[kLanes], y[kLanes];
+  for (int i = 0; i < kLanes; ++i) {
+    x[i] = (pixels[std::min(i, count - 1)][0] - cx) * per_fx;
+    y[i] = (pixels[std::min(i, count - 1)][1] - cy) * per_fy;
+  }
   for (int i = 0; i < kLanes; ++i) {
     valid[i] = i < count ? -1 : 0;
-    const float* pixel = pixels[std::min(i, count - 1)];
-    const Eigen::Vector3f direction =
-        R_world_camera_ * Eigen::Vector3f((pixel[0] - static_cast<float>(camera_.cx)) / static_cast<float>(camera_.fx),
-                                          (pixel[1] - static_cast<float>(camera_.cy)) / static_cast<float>(camera_.fy), 1.0f);
     packet.ray.org_x[i] = eye_in_world_.x();
     packet.ray.org_y[i] = eye_in_world_.y();
     packet.ray.org_z[i] = eye_in_world_.z();
-    packet.ray.dir_x[i] = direction.x();
-    packet.ray.dir_y[i] = direction.y();
-    packet.ray.dir_z[i] = direction.z();
+    packet.ray.dir_x[i] = R(0, 0) * x[i] + R(0, 1) * y[i] + R(0, 2);
+    packet.ray.dir_y[i] = R(1, 0) * x[i] + R(1, 1) * y[i] + R(1, 2);
+    packet.ray.dir_z[i] = R(2, 0) * x[i] + R(2, 1) * y[i] + R(2, 2);
     packet.ray.tnear[i] = 1e-3f;
     packet.ray.tfar[i] = 1e9f;
     packet.ray.time[i] = 0.0f;
     packet.ray.mask[i] = ~0u;
     packet.ray.id[i] = static_cast<unsigned>(i);
     packet.ray.flags[i] = 0;
+    packet.hit.Ng_x[i] = packet.hit.Ng_y[i] = packet.hit.Ng_z[i] = 0.0f;
     packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
@@ -60,13 +65,18 @@ void Exposure::Cast(const float (*pixels)[2], int count, Hit* hits) const {
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   rtcIntersect8(valid, scene_, &context, &packet);
+  alignas(32) float scale[kLanes];
+  for (int i = 0; i < kLanes; ++i) {
+    const RTCHit8& hit = packet.hit;
+    scale[i] = 1.0f / std::sqrt(hit.Ng_x[i] * hit.Ng_x[i] + hit.Ng_y[i] * hit.Ng_y[i] + hit.Ng_z[i] * hit.Ng_z[i] + 1e-30f);
+  }
   for (int i = 0; i < count; ++i) {
     hits[i].instance = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID ? -1 : static_cast<int>(packet.hit.instID[0][i]);
     hits[i].triangle = packet.hit.primID[i];
     hits[i].depth = packet.ray.tfar[i];
     hits[i].u = packet.hit.u[i];
     hits[i].v = packet.hit.v[i];
-    hits[i].normal_in_mesh = {packet.hit.Ng_x[i], packet.hit.Ng_y[i], packet.hit.Ng_z[i]};
+    hits[i].normal_in_mesh = {scale[i] * packet.hit.Ng_x[i], scale[i] * packet.hit.Ng_y[i], scale[i] * packet.hit.Ng_z[i]};
   }
 }
 
@@ -93,35 +103,31 @@ Eigen::Vector3f Exposure::Shade(const Hit& hit, float x, float y, float pixel_si
     return {static_cast<float>(b[0]), static_cast<float>(b[1]), static_cast<float>(b[2])};
   }
   const Instance& instance = instances_[hit.instance];
-  const Mesh& mesh = *instance.shape->mesh;
   const Eigen::Matrix3f& R = R_mesh_camera_[hit.instance];
   const float fx = static_cast<float>(camera_.fx), fy = static_cast<float>(camera_.fy);
   const Eigen::Vector3f ray =
       R * Eigen::Vector3f((x - static_cast<float>(camera_.cx)) / fx, (y - static_cast<float>(camera_.cy)) / fy, 1.0f);
-  Eigen::Vector3f normal = hit.normal_in_mesh.normalized();
+  Eigen::Vector3f normal = hit.normal_in_mesh;
   if (normal.dot(ray) > 0.0f) normal = -normal;
   const float towards = -normal.dot(ray);
   *grazing = towards / ray.norm();
 
-  const Eigen::Vector3i& t = mesh.triangles[hit.triangle];
   const float brightness = Brightness(instance, hit, normal);
-  if (mesh.texture.empty())
+  const Mesh& mesh = *instance.shape->mesh;
+  if (mesh.texture.empty()) {
+    const Eigen::Vector3i& t = mesh.triangles[hit.triangle];
     return brightness * ((1 - hit.u - hit.v) * mesh.colors[t[0]] + hit.u * mesh.colors[t[1]] + hit.v * mesh.colors[t[2]]);
+  }
 
   // The pixel's edges on the surface (ray differentials, Igehy 1999), then in the texture by the gradients of (u, v).
+  const float slant = 1.0f / std::max(towards, 1e-4f);
   const auto on_surface = [&](const Eigen::Vector3f& step) -> Eigen::Vector3f {
-    return hit.depth * (step + ray * (normal.dot(step) / std::max(towards, 1e-4f)));
+    return hit.depth * (step + ray * (normal.dot(step) * slant));
   };
   const Eigen::Vector3f across = on_surface(R.col(0) * (pixel_size / fx)), down = on_surface(R.col(1) * (pixel_size / fy));
-  const Eigen::Vector3f e1 = mesh.vertices[t[1]] - mesh.vertices[t[0]], e2 = mesh.vertices[t[2]] - mesh.vertices[t[0]];
-  const Eigen::Vector3f n = e1.cross(e2);
-  const float scale = 1.0f / std::max(n.squaredNorm(), 1e-30f);
-  const Eigen::Vector3f gradient_u = scale * e2.cross(n), gradient_v = scale * n.cross(e1);
-  const Eigen::Vector2f uv0 = mesh.texture_uv[t[0]], uv1 = mesh.texture_uv[t[1]] - uv0, uv2 = mesh.texture_uv[t[2]] - uv0;
-  const auto in_texture = [&](const Eigen::Vector3f& step) -> Eigen::Vector2f {
-    return gradient_u.dot(step) * uv1 + gradient_v.dot(step) * uv2;
-  };
-  return brightness * instance.shape->texture.Sample(uv0 + hit.u * uv1 + hit.v * uv2, in_texture(across), in_texture(down));
+  const Facet& facet = instance.shape->facets[hit.triangle];
+  return brightness * instance.shape->texture.Sample(facet.uv0 + hit.u * facet.uv1 + hit.v * facet.uv2, facet.uv_per_m * across,
+                                                     facet.uv_per_m * down);
 }
 
 void Exposure::FirstRays(int row_begin, int row_end) {
@@ -143,30 +149,42 @@ void Exposure::FirstRays(int row_begin, int row_end) {
         image_->color.at<cv::Vec3b>(y, x) = ToPixel(Shade(hits[i], pixels[i][0], pixels[i][1], 1.0f, &grazing));
         image_->grazing.at<float>(y, x) = grazing;
         image_->label.at<int>(y, x) = hits[i].instance;
-        const Eigen::Vector3f normal = hits[i].normal_in_mesh.normalized();
-        normals_.at<cv::Vec3f>(y, x) = {normal.x(), normal.y(), normal.z()};
         image_->depth.at<float>(y, x) = hits[i].instance < 0 ? 0.0f : hits[i].depth;
+        surfaces_[static_cast<std::size_t>(y) * camera_.width + x] = SurfaceOf(hits[i]);
       }
     }
   }
 }
 
-// Whether the surface breaks between a pixel and its two neighbours along one axis: another instance, an edge, a jump.
-bool Exposure::Breaks(int x, int y, int step_x, int step_y) const {
-  const int ax = std::max(x - step_x, 0), ay = std::max(y - step_y, 0);
-  const int bx = std::min(x + step_x, camera_.width - 1), by = std::min(y + step_y, camera_.height - 1);
-  const int label = image_->label.at<int>(y, x);
-  if (image_->label.at<int>(ay, ax) != label || image_->label.at<int>(by, bx) != label) return true;
-  if (label < 0 || (ax == x && ay == y) || (bx == x && by == y)) return false;
-  const cv::Vec3f& normal = normals_.at<cv::Vec3f>(y, x);
-  if (std::abs(normal.dot(normals_.at<cv::Vec3f>(ay, ax))) < kEdge || std::abs(normal.dot(normals_.at<cv::Vec3f>(by, bx))) < kEdge)
-    return true;
-  // 1/z is linear in the image on a plane.
-  const float z = image_->depth.at<float>(y, x);
-  return std::abs(z / image_->depth.at<float>(ay, ax) + z / image_->depth.at<float>(by, bx) - 2.0f) > 0.01f;
+Exposure::Surface Exposure::SurfaceOf(const Hit& hit) {
+  if (hit.instance < 0) return {-1, 0.0f, {0, 0, 0}};
+  const Eigen::Vector3f normal = 127.0f * hit.normal_in_mesh;
+  return {hit.instance,
+          1.0f / hit.depth,
+          {static_cast<std::int8_t>(normal.x()), static_cast<std::int8_t>(normal.y()), static_cast<std::int8_t>(normal.z())}};
 }
 
-bool Exposure::IsOutline(int x, int y) const { return Breaks(x, y, 1, 0) || Breaks(x, y, 0, 1); }
+// Whether the surface breaks at a pixel between two neighbours: another instance, an edge, a jump in depth.
+bool Exposure::Breaks(const Surface& before, const Surface& here, const Surface& after) {
+  if (before.instance != here.instance || after.instance != here.instance) return true;
+  if (here.instance < 0) return false;
+  // 1/z is linear in the image on a plane.
+  if (std::abs(before.inverse_depth + after.inverse_depth - 2.0f * here.inverse_depth) > 0.01f * here.inverse_depth) return true;
+  const auto cosine = [](const Surface& a, const Surface& b) {
+    return std::abs(a.normal[0] * b.normal[0] + a.normal[1] * b.normal[1] + a.normal[2] * b.normal[2]);
+  };
+  return cosine(before, here) < kEdge || cosine(after, here) < kEdge;
+}
+
+bool Exposure::IsOutline(int x, int y) const {
+  const Surface* here = &surfaces_[static_cast<std::size_t>(y) * camera_.width + x];
+  const int left = x > 0 ? 1 : 0, right = x + 1 < camera_.width ? 1 : 0;
+  const int above = y > 0 ? camera_.width : 0, below = y + 1 < camera_.height ? camera_.width : 0;
+  // At the image's border a neighbour is missing, and 1/z tells nothing.
+  const Surface& up = below ? here[-above] : *here;
+  const Surface& down = above ? here[below] : *here;
+  return Breaks(right ? here[-left] : *here, *here, left ? here[right] : *here) || Breaks(up, *here, down);
+}
 
 void Exposure::SmoothOutlines(int row_begin, int row_end) {
   const int n = params_.samples_per_axis, samples = n * n;

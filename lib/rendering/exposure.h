@@ -11,11 +11,18 @@
 
 namespace vantage::rendering {
 
+// Where a triangle is in the texture: all that shading reads, in one cache line.
+struct Facet {
+  Eigen::Vector2f uv0, uv1, uv2;        // Of the first corner; of the others relative to it.
+  Eigen::Matrix<float, 2, 3> uv_per_m;  // How (u, v) change along the surface, by steps in mesh coordinates.
+};
+
 // What one mesh needs, shared by its instances.
 struct Shape {
   std::shared_ptr<const Mesh> mesh;
   MipTexture texture;
   std::vector<Eigen::Vector3f> normals;  // One per vertex, mean over its triangles by area; empty where all faces are flat.
+  std::vector<Facet> facets;             // One per triangle; empty where there is no texture.
   RTCScene scene = nullptr;
 
   Shape(RTCDevice device, std::shared_ptr<const Mesh> source);
@@ -44,13 +51,19 @@ class Exposure {
     int instance = -1;
     unsigned triangle = 0;
     float depth = 0, u = 0, v = 0;
-    Eigen::Vector3f normal_in_mesh;
+    Eigen::Vector3f normal_in_mesh;  // Unit length.
+  };
+  struct Surface {  // What a first ray hit, as small as it can be.
+    int instance;
+    float inverse_depth;
+    std::int8_t normal[3];  // In the mesh's coordinates, length 127.
   };
   void Cast(const float (*pixels)[2], int count, Hit* hits) const;
   Eigen::Vector3f Shade(const Hit& hit, float x, float y, float pixel_size, float* grazing) const;
   float Brightness(const Instance& instance, const Hit& hit, const Eigen::Vector3f& normal_in_mesh) const;
+  static Surface SurfaceOf(const Hit& hit);
   bool IsOutline(int x, int y) const;
-  bool Breaks(int x, int y, int step_x, int step_y) const;
+  static bool Breaks(const Surface& before, const Surface& here, const Surface& after);
 
   RTCScene scene_;
   const std::vector<Instance>& instances_;
@@ -61,7 +74,7 @@ class Exposure {
   Eigen::Vector3f eye_in_world_;
   Eigen::Vector3f light_;
   std::vector<Eigen::Matrix3f> R_mesh_camera_;  // Per instance.
-  cv::Mat normals_;                             // CV_32FC3, of the first rays, in the coordinates of the mesh hit.
+  std::vector<Surface> surfaces_;               // Row-major.
 };
 
 }  // namespace vantage::rendering

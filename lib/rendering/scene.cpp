@@ -42,11 +42,28 @@ std::vector<Eigen::Vector3f> VertexNormals(const Mesh& mesh) {
   return {};
 }
 
+Facet FacetOf(const Mesh& mesh, const Eigen::Vector3i& t) {
+  const Eigen::Vector3f e1 = mesh.vertices[t[1]] - mesh.vertices[t[0]], e2 = mesh.vertices[t[2]] - mesh.vertices[t[0]];
+  const Eigen::Vector3f n = e1.cross(e2);
+  const float scale = 1.0f / std::max(n.squaredNorm(), 1e-30f);
+  Facet facet;
+  facet.uv0 = mesh.texture_uv[t[0]];
+  facet.uv1 = mesh.texture_uv[t[1]] - facet.uv0;
+  facet.uv2 = mesh.texture_uv[t[2]] - facet.uv0;
+  // The barycentric coordinates' gradients are e2 x n and n x e1 over |n|^2.
+  facet.uv_per_m = facet.uv1 * (scale * e2.cross(n)).transpose() + facet.uv2 * (scale * n.cross(e1)).transpose();
+  return facet;
+}
+
 }  // namespace
 
 Shape::Shape(RTCDevice device, std::shared_ptr<const Mesh> source) : mesh(std::move(source)) {
   CheckMesh(*mesh);
-  if (!mesh->texture.empty()) texture = MipTexture(mesh->texture);
+  if (!mesh->texture.empty()) {
+    texture = MipTexture(mesh->texture);
+    facets.reserve(mesh->triangles.size());
+    for (const Eigen::Vector3i& t : mesh->triangles) facets.push_back(FacetOf(*mesh, t));
+  }
   normals = VertexNormals(*mesh);
   scene = rtcNewScene(device);
   rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);  // No light leaks between the triangles of a fine depth mesh.
