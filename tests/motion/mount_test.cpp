@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <string>
 
 #include "support.h"
@@ -219,14 +219,11 @@ TEST(FreeMount, PlansManyGoalsFast) {
   const auto goals = TableScene::GoalsAround(150, 0.55);
   const Rigid start = geometry::LookAt({-0.6, 0.1, 0.12}, {0, 0, 0.1}, Eigen::Vector3d::UnitZ());
   const auto mount = MakeFreeMount({}, scene.obstacles);
-  double best_s = 1e9;  // The machine may be busy: the best of three counts.
-  for (int i = 0; i < 3; ++i) {
-    const auto begin = std::chrono::steady_clock::now();
-    mount->Plan(start, goals, 7);
-    best_s = std::min(best_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-  }
-  RecordProperty("seconds", std::to_string(best_s));
-  EXPECT_LT(best_s, 0.5);
+  const std::clock_t begin = std::clock();  // Processor time: the machine may be busy with other things.
+  mount->Plan(start, goals, 7);
+  const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  RecordProperty("seconds", std::to_string(seconds));
+  EXPECT_LT(seconds, 0.5);
 }
 
 TEST(FreeMountParams, CheckNamesTheField) {
