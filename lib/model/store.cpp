@@ -129,8 +129,9 @@ void CreateFile(const std::filesystem::path& file) {
   std::filesystem::remove(temporary, ignored);
 }
 
-// SQLite needs to write beside a WAL database even to read it. In a folder where that is forbidden nobody else writes either.
-std::string ReadOnlyUri(const std::filesystem::path& file) {
+// SQLite needs to write beside a WAL database even to read it, and only who may write tidies up after the last reader: so a reader
+// opens the file like a writer where it may, and forbids itself to write. In a folder that nobody may write to nothing changes.
+std::string ReaderUri(const std::filesystem::path& file) {
   const std::filesystem::path absolute = std::filesystem::absolute(file);
   std::string escaped;
   for (const char c : absolute.string()) {
@@ -148,10 +149,11 @@ std::string ReadOnlyUri(const std::filesystem::path& file) {
         escaped += c;
     }
   }
+  std::error_code missing;
+  const std::uintmax_t wal_bytes = std::filesystem::file_size(absolute.string() + "-wal", missing);
+  const bool has_wal = !missing && wal_bytes > 0;
   const bool folder_is_writable = ::access(absolute.parent_path().c_str(), W_OK) == 0;
-  std::error_code ignored;
-  const std::uintmax_t wal_bytes = std::filesystem::file_size(absolute.string() + "-wal", ignored);
-  const bool has_wal = !ignored && wal_bytes > 0;
+  if (folder_is_writable && ::access(absolute.c_str(), W_OK) == 0) return "file:" + escaped + "?mode=rw";
   return "file:" + escaped + (folder_is_writable || has_wal ? "?mode=ro" : "?mode=ro&immutable=1");
 }
 
@@ -303,8 +305,10 @@ struct Store::Impl {
   mutable SQLite::Database database;
 
   Impl(const std::filesystem::path& file, Mode mode)
-      : database(mode == Mode::kRead ? ReadOnlyUri(file) : file.string(),
-                 mode == Mode::kRead ? SQLite::OPEN_READONLY | SQLite::OPEN_URI : SQLite::OPEN_READWRITE, kBusyTimeoutMs) {}
+      : database(mode == Mode::kRead ? ReaderUri(file) : file.string(),
+                 SQLite::OPEN_READWRITE | (mode == Mode::kRead ? SQLite::OPEN_URI : 0), kBusyTimeoutMs) {
+    if (mode == Mode::kRead) database.exec("PRAGMA query_only = ON");
+  }
 
   void PrepareToWrite() {
     if (IsEmptyDatabase(database)) CreateSchema(database);

@@ -25,6 +25,18 @@ std::string VerbName(const CLI::App& app) {
   return name;
 }
 
+// The first word where a verb is due that is none; empty where there is no such word.
+std::string UnknownVerb(const CLI::App& app, int argc, char** argv) {
+  const CLI::App* verb = &app;
+  for (int i = 1; i < argc && argv[i][0] != '-' && verb->get_require_subcommand_min() > 0; ++i) {
+    const std::string word = argv[i];
+    const auto named = verb->get_subcommands([&](const CLI::App* candidate) { return candidate->get_name() == word; });
+    if (named.empty()) return word;
+    verb = named.front();
+  }
+  return "";
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -35,10 +47,11 @@ int main(int argc, char** argv) {
   vantage::cli::AddLearn(app, run);
   vantage::cli::AddRecognise(app, run);
   vantage::cli::AddAssess(app, run);
-#ifdef VANTAGE_EXPLORE
   vantage::cli::AddExplore(app, run);
-#endif
   vantage::cli::AddModels(app, run);
+  if (const std::string word = UnknownVerb(app, argc, argv); !word.empty()) {
+    return Fail("vantage", "there is no verb '" + word + "'; see vantage --help");
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {

@@ -149,6 +149,7 @@ TEST_F(StoreTest, WhatIsSavedComesBackToTheLastBit) {
     store.SaveObject(box);
     store.SaveObject(bare);
   }
+  Store(file_, Store::Mode::kRead).List();
   EXPECT_FALSE(fs::exists(file_.string() + "-wal")) << "a store that was closed is one file";
   const Store store(file_, Store::Mode::kRead);
   const std::optional<ObjectModel> loaded = store.Load("cracker box");
@@ -156,6 +157,7 @@ TEST_F(StoreTest, WhatIsSavedComesBackToTheLastBit) {
   ExpectSame(*loaded, box);
   ExpectSame(store.Load("no depth").value(), bare);
   EXPECT_FALSE(store.Load("mug"));
+  EXPECT_THROW(Store(file_, Store::Mode::kRead).SaveObject(box), std::runtime_error) << "a reader does not write";
   const std::vector<Store::Summary> list = store.List();
   ASSERT_EQ(list.size(), 2u);
   EXPECT_EQ(list[0].name, "cracker box");
