@@ -17,8 +17,8 @@ struct TrialParams {
   int negatives_per_view = 10;     // Images without the object; >= 0.
   double max_rotation_deg = 60.0;  // Out of plane, uniform in 0..max; (0, 90].
   double max_scale_octaves = 1.0;  // log2 scale uniform in +-max: 1 = 0.5..2 times the distance; >= 0.
-  double max_image_noise = 16.0;   // Sigma, grey levels, one of 8 even levels from 0; >= 0.
-  double max_blur_px = 1.6;        // Sigma, one of 8 even levels from 0; >= 0.
+  double max_image_noise = 16.0;   // Sigma, grey levels, one of 8 even levels from 0, the lower of two draws; >= 0.
+  double max_blur_px = 1.6;        // Sigma, likewise; >= 0.
   double max_brightness = 0.25;    // Relative change of brightness, and of gamma; [0, 1).
   double correct_m = 0.04;         // Mean point distance below which a detection is right; > 0.
   int image_width = 320;           // Virtual images are crops around the object, as tight as they can be but
@@ -42,8 +42,9 @@ struct Trial {
 };
 
 // Trials for the views from `first_view` on. `backgrounds`: BGR images the object is pasted over (the run's own frames with the
-// objects masked, or photographs); plain grey noise where empty. Deterministic in (model, params). `progress` is called after every
-// trial.
+// objects masked, or photographs); plain grey noise where empty. Deterministic in (model, params, backgrounds); a view's dice do
+// not depend on first_view, but views learned later change what earlier ones look like from aside. `progress` is called after every
+// trial. Cost: about 100 ms of one core a trial, two thirds of it interest points.
 std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, const std::vector<cv::Mat>& backgrounds,
                              const recognition::RecogniserParams& recogniser, const TrialParams& params,
                              const std::function<void(int done, int of)>& progress = {});

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
@@ -12,10 +11,11 @@
 namespace vantage::assessment {
 namespace {
 
-constexpr int kMarginPx = 40;              // Background around the object: room for descriptors and for being mistaken.
-constexpr int kMaxMeshVertices = 15000;    // The texture keeps its full resolution; only the surface is thinned.
-constexpr int kMaxFillViews = 4;           // Keyframes that fill what the trial's own view did not see.
-constexpr double kInFrontM = 0.015;        // A filling surface this much nearer hides the view's own (noise stays behind).
+constexpr int kMarginPx = 40;            // Background around the object: room for descriptors and for being mistaken.
+constexpr int kMaxMeshVertices = 15000;  // The texture keeps its full resolution; only the surface is thinned.
+constexpr std::size_t kMaxViews = 4;     // Keyframes one image is made of.
+constexpr double kWorthwhileShare = 0.01;
+constexpr double kInFrontM = 0.015;        // A surface this much nearer hides one already drawn (noise stays behind).
 constexpr double kMinSourceCosine = 0.17;  // Surface the keyframe saw at more than 80 degrees is smeared: as good as unknown.
 constexpr double kMinCosine = 0.05;
 
@@ -132,28 +132,28 @@ geometry::PinholeCamera VirtualObject::Window(int view, const geometry::Rigid& T
   return camera;
 }
 
-VirtualImage VirtualObject::Render(int view, const geometry::PinholeCamera& camera, const geometry::Rigid& T_camera_object) const {
+VirtualImage VirtualObject::Render(const geometry::PinholeCamera& camera, const geometry::Rigid& T_camera_object) const {
   const geometry::Rigid T_object_camera = T_camera_object.inverse();
   const Eigen::Vector3d direction = geometry::ViewDirection(T_camera_object);
 
-  // The view itself, then the others by their angle to the virtual camera.
-  std::vector<int> order(object_.views.size());
-  std::iota(order.begin(), order.end(), 0);
-  const auto rank = [&](int i) {
-    return i == view ? -1.0 : geometry::AngleBetween(direction, geometry::ViewDirection(object_.views[i].T_camera_object));
-  };
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return rank(a) < rank(b); });
+  std::vector<std::pair<double, int>> order;
+  for (int i = 0; i < static_cast<int>(surfaces_.size()); ++i) {
+    if (!surfaces_[i]) continue;
+    const double angle = geometry::AngleBetween(direction, geometry::ViewDirection(object_.views[i].T_camera_object));
+    if (angle < M_PI_2) order.emplace_back(angle, i);
+  }
+  std::sort(order.begin(), order.end());
+  if (order.size() > kMaxViews) order.resize(kMaxViews);
 
   rendering::RenderParams params;
   params.shaded = false;
   VirtualImage result{cv::Mat(camera.height, camera.width, CV_8UC3, cv::Scalar::all(0)),
                       cv::Mat(camera.height, camera.width, CV_8UC1, cv::Scalar(0))};
   cv::Mat depth(camera.height, camera.width, CV_32FC1, cv::Scalar(1e9));
-  int rendered = 0;
-  for (int i : order) {
-    if (!surfaces_[i] || rank(i) > M_PI_2) continue;
-    if (rendered++ > kMaxFillViews) break;
+  int shown = 0;
+  for (const auto& [angle, i] : order) {
     const Surface& surface = *surfaces_[i];
+    int added = 0;
     const rendering::Image image = surface.scene.Render(camera, T_object_camera, params);
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {
@@ -164,8 +164,11 @@ VirtualImage VirtualObject::Render(int view, const geometry::PinholeCamera& came
         depth.at<float>(y, x) = z;
         result.color.at<cv::Vec3b>(y, x) = image.color.at<cv::Vec3b>(y, x);
         result.mask.at<std::uint8_t>(y, x) = 255;
+        ++added;
       }
     }
+    shown += added;
+    if (added > 0 && added < kWorthwhileShare * shown) break;  // The next ones are farther off and would add less.
   }
   return result;
 }

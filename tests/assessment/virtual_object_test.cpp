@@ -72,7 +72,7 @@ TEST(VirtualObject, FromTheLearnedPoseItLooksAsItDid) {
   const model::ObjectModel object = FlatObject();
   const VirtualObject surface(object);
   const model::View& view = object.views[0];
-  const VirtualImage image = surface.Render(0, view.keyframe.camera, view.T_camera_object);
+  const VirtualImage image = surface.Render(view.keyframe.camera, view.T_camera_object);
   cv::Mat inner;
   cv::erode(image.mask, inner, cv::Mat(), cv::Point(-1, -1), 3);
   ASSERT_GT(cv::countNonZero(image.mask), 0.93 * cv::countNonZero(view.mask));
@@ -91,7 +91,7 @@ TEST(VirtualObject, TurnedAwayItIsForeshortenedAndFromBehindNotThere) {
     double sum = 0.0;
     for (double tilt : {M_PI_2, -M_PI_2}) {
       const geometry::Rigid T = VirtualCameraPose(object.views[0], {rotation_deg * kDegree, tilt, 0.0, 0.0});
-      sum += cv::countNonZero(surface.Render(0, surface.Window(0, T, 640, 480), T).mask);
+      sum += cv::countNonZero(surface.Render(surface.Window(0, T, 640, 480), T).mask);
     }
     return sum;
   };
@@ -99,19 +99,19 @@ TEST(VirtualObject, TurnedAwayItIsForeshortenedAndFromBehindNotThere) {
 
   geometry::Rigid behind = object.views[0].T_camera_object;
   behind.linear() = behind.linear() * Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  EXPECT_EQ(cv::countNonZero(surface.Render(0, object.views[0].keyframe.camera, behind).mask), 0);
+  EXPECT_EQ(cv::countNonZero(surface.Render(object.views[0].keyframe.camera, behind).mask), 0);
 }
 
-TEST(VirtualObject, OtherViewsFillWhatTheTrialsViewDidNotSee) {
+TEST(VirtualObject, OtherViewsFillWhatTheNearestDidNotSee) {
   model::ObjectModel object = FlatObject();
   object.views.push_back(FlatView(0.2, 2));
   model::View& first = object.views[0];
   first.mask(cv::Rect(0, 0, first.mask.cols / 2, first.mask.rows)).setTo(0);  // It saw the right half only.
   const VirtualObject surface(object);
-  const VirtualImage image = surface.Render(0, first.keyframe.camera, first.T_camera_object);
+  const VirtualImage image = surface.Render(first.keyframe.camera, first.T_camera_object);
   const cv::Mat whole = FlatView(0.0, 1).mask;
   EXPECT_GT(cv::countNonZero(image.mask), 0.93 * cv::countNonZero(whole));
-  // What the view knows itself is shown as it saw it.
+  // What the nearest view knows is shown as it saw it.
   cv::Mat inner, difference;
   cv::erode(first.mask, inner, cv::Mat(), cv::Point(-1, -1), 3);
   cv::absdiff(image.color, first.keyframe.color, difference);
