@@ -236,7 +236,7 @@ struct Learner::Impl {
     return std::all_of(object->views.begin(), object->views.end(), [&](const model::View& view) {
       const measures::Viewpoint old = view.viewpoint();
       return geometry::AngleBetween(camera, old.direction) > params.min_view_angle_deg * M_PI / 180.0 ||
-             std::abs(std::log2(camera.norm() / old.distance_m)) > 0.5;
+             std::abs(std::log2(camera.norm() / old.distance_m)) > 1.0 / 3.0;
     });
   }
 
@@ -244,7 +244,7 @@ struct Learner::Impl {
   std::string AddView(const rgbd::Frame& frame, const Track& track, bool pose_is_known) {
     if (track.confidence.value >= params.new_view_confidence) return "well known from here";
     if (!pose_is_known && track.probability < params.min_track_probability) return "not sure enough to learn";
-    if (!IsNewDirection(track.T_camera_object)) return "too near to a learned view";
+    if (!pose_is_known && !IsNewDirection(track.T_camera_object)) return "too near to a learned view";
     if (!Segment(frame)) return "no table plane";
     const int cluster = ClusterOfObject(clusters, *object, track.T_camera_object, frame.camera);
     if (cluster < 0) return "no cluster where the object is";

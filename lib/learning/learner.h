@@ -21,13 +21,13 @@ struct LearnerParams {
   double min_track_probability = 0.7;  // ...but only with p(o|c) at least this; (0, 1).
   int min_view_points = 20;            // A view needs so many interest points with depth; >= 4.
   double min_view_angle_deg =
-      8.0;  // A new view differs from every other by so much in direction (or by half an octave in distance); >= 0.
+      10.0;  // A new view differs from every other by so much in direction (or by a third of an octave in distance); >= 0.
   double max_mount_translation_m =
       0.05;  // Where the mount's pose is known, a track that contradicts it by more is not trusted; > 0.
   double max_mount_rotation_deg = 10.0;
   bool require_mount_agreement = true;  // Use the check above where poses are known.
-  int surface_samples = 600;            // Points of the learned surface that are drawn to the depth image; 0 = none.
-  int surface_views = 2;                // ...taken from so many nearest views; >= 1.
+  int surface_samples = 1000;           // Points of the learned surface that are drawn to the depth image; 0 = none.
+  int surface_views = 3;                // ...taken from so many nearest views; >= 1.
   double roi_margin = 0.25;  // Interest points are sought this share of the object's size around where it is expected; >= 0.
 
   void Check() const;  // Throws std::invalid_argument naming the field.

@@ -70,7 +70,7 @@ void AddMatch(const Match2d3d& match, const geometry::PinholeCamera& camera, con
 // Point to plane against the depth image. Neighbouring depths err together, so that a sample weighs less than a match.
 void AddSurface(const SurfacePoint& sample, const rgbd::Frame& frame, const geometry::Rigid& T, NormalEquations* equations) {
   constexpr double kMaxDistance = 0.02;
-  constexpr double kSampleWeight = 0.25;
+  constexpr double kSampleWeight = 1.0;
   const Eigen::Vector3d p = T * sample.point;
   const Eigen::Vector3d normal = T.linear() * sample.normal;
   if (normal.dot(p.normalized()) > -0.2) return;  // Seen at a grazing angle or from behind.

@@ -82,6 +82,8 @@ void Fields(Visitor& visit, learning::LearnerParams& params) {
   visit("max_mount_translation_m", params.max_mount_translation_m);
   visit("max_mount_rotation_deg", params.max_mount_rotation_deg);
   visit("require_mount_agreement", params.require_mount_agreement);
+  visit("surface_samples", params.surface_samples);
+  visit("surface_views", params.surface_views);
   visit("roi_margin", params.roi_margin);
 }
 
