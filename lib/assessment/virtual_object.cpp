@@ -11,13 +11,13 @@
 namespace vantage::assessment {
 namespace {
 
-constexpr int kMarginPx = 40;            // Background around the object: room for descriptors and for being mistaken.
-constexpr int kMaxMeshVertices = 15000;  // The texture keeps its full resolution; only the surface is thinned.
-constexpr std::size_t kMaxViews = 4;     // Keyframes one image is made of.
-constexpr double kWorthwhileShare = 0.01;
+constexpr int kMarginPx = 40;              // Background around the object: room for descriptors and for being mistaken.
+constexpr int kMaxMeshVertices = 15000;    // The texture keeps its full resolution; only the surface is thinned.
+constexpr std::size_t kMaxViews = 4;       // Keyframes one image is made of.
+constexpr double kWorthwhileShare = 0.01;  // Of the image so far: a keyframe that adds less is the last.
 constexpr double kInFrontM = 0.015;        // A surface this much nearer hides one already drawn (noise stays behind).
 constexpr double kMinSourceCosine = 0.17;  // Surface the keyframe saw at more than 80 degrees is smeared: as good as unknown.
-constexpr double kMinCosine = 0.05;
+constexpr double kMinCosine = 0.05;        // Likewise for the virtual camera.
 
 // Unit normals of the keyframe's depth, camera coordinates, facing the camera; zero where unknown. CV_32FC3.
 cv::Mat NormalMap(const rgbd::Frame& frame, const cv::Mat& mask) {
@@ -57,7 +57,7 @@ struct VirtualObject::Surface {
   cv::Mat normals;
   const model::View* view = nullptr;
 
-  // Whether the surface at this point was seen well by the keyframe and shows its outside to a camera in direction `to_camera`.
+  // Whether the keyframe saw the surface at this point well, and a camera at that place sees the same side of it.
   bool ShowsOutside(const Eigen::Vector3d& point_in_object, const Eigen::Vector3d& camera_in_object) const {
     const Eigen::Vector3d point = view->T_camera_object * point_in_object;
     const auto pixel = view->keyframe.camera.Project(point);

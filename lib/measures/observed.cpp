@@ -7,8 +7,9 @@
 namespace vantage::measures {
 namespace {
 
-// Measured on photographs of textured boxes with the recogniser's default settings.
-constexpr Gaussian kDefaultPositive{0.45, 0.17, 0};
+// A textured box in 360 pairs of photographs, 0 to 75 degrees from the one view known, with the recogniser's default settings:
+// right ones had 0.29 +- 0.09, wrong ones 0.12 +- 0.07. Other objects differ, so the right ones are lower and wider here.
+constexpr Gaussian kDefaultPositive{0.27, 0.12, 0};
 constexpr Gaussian kDefaultNegative{0.12, 0.07, 0};
 
 // Confidences are ratios of a few dozen points: no population of them is narrower than this.
