@@ -58,6 +58,7 @@ void Fields(Visitor& visit, segmentation::PlaneParams& params) {
   visit("step_px", params.step_px);
   visit("min_share", params.min_share);
   visit("max_depth_m", params.max_depth_m);
+  visit("min_up", params.min_up);
 }
 
 template <typename Visitor>
@@ -66,6 +67,7 @@ void Fields(Visitor& visit, segmentation::ClusterParams& params) {
   visit("max_height_m", params.max_height_m);
   visit("max_jump_m", params.max_jump_m);
   visit("bridge_px", params.bridge_px);
+  visit("merge_share", params.merge_share);
   visit("min_size_m", params.min_size_m);
   visit("max_size_m", params.max_size_m);
   visit("min_pixels", params.min_pixels);
