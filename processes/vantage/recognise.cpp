@@ -7,6 +7,7 @@
 
 #include "model/store.h"
 #include "vantage/sequence.h"
+#include "vantage/truth_judge.h"
 #include "vantage/verb.h"
 
 namespace vantage::cli {
@@ -19,6 +20,7 @@ struct RecogniseOptions {
   std::string frames = "all";
   std::string bop;  // Result in the BOP challenge's format; empty = none.
   bool no_query_depth = false;
+  std::optional<int> truth_object_id;  // Hold the detections of the store's only object against the truth of this one.
 };
 
 struct FrameResult {
@@ -88,6 +90,24 @@ std::map<std::string, int> LoadObjects(const std::string& file, recognition::Rec
   return ids;
 }
 
+Json ToJson(const Tally& tally) {
+  Json result;
+  result["frames"] = tally.frames;
+  result["right"] = tally.right;
+  result["right_10mm"] = tally.right_10mm;
+  result["detections"] = tally.detections;
+  result["wrong"] = tally.wrong;
+  return result;
+}
+
+std::optional<TruthJudge> JudgeFor(const RecogniseOptions& options, const rgbd::BopScene& scene) {
+  if (!options.truth_object_id) return std::nullopt;
+  const model::Store store(options.store, model::Store::Mode::kRead);
+  const auto objects = store.List();
+  if (objects.size() != 1) throw std::runtime_error(options.store + ": --truth-object-id needs a store of one object");
+  return TruthJudge(scene, *options.truth_object_id, *store.Load(objects[0].name));
+}
+
 FrameResult RecogniseFrame(const recognition::Recogniser& recogniser, rgbd::Frame frame) {
   if (!recogniser.params().use_query_depth) frame.depth = cv::Mat();
   FrameResult result;
@@ -108,11 +128,15 @@ void RunRecognise(const RecogniseOptions& options) {
   recognition::Recogniser recogniser(params.recogniser);
   const std::map<std::string, int> object_ids = LoadObjects(options.store, recogniser);
 
+  std::optional<TruthJudge> judge = JudgeFor(options, scene);
+
   std::vector<FrameResult> frames;
   std::vector<double> ms;
   std::size_t detections = 0;
   for (const int id : ids) {
-    frames.push_back(RecogniseFrame(recogniser, scene.Load(id)));
+    const rgbd::Frame frame = scene.Load(id);
+    frames.push_back(RecogniseFrame(recogniser, frame));
+    if (judge) judge->Add(frame, frames.back().detections);
     ms.push_back(frames.back().ms);
     detections += frames.back().detections.size();
   }
@@ -121,6 +145,7 @@ void RunRecognise(const RecogniseOptions& options) {
   result["frames"] = Json::array();
   for (const FrameResult& frame : frames) result["frames"].push_back(ToJson(frame));
   result["ms_median"] = Number(Quantile(ms, 0.5));
+  if (judge) result["truth"] = ToJson(judge->tally());
   if (!options.bop.empty()) {
     WriteWhole(options.bop, ToBop(frames, TrailingNumber(NameOfFolder(options.sequence), 0), object_ids));
   }
@@ -128,6 +153,11 @@ void RunRecognise(const RecogniseOptions& options) {
   summary.precision(3);
   summary << detections << " detections of " << object_ids.size() << " objects in " << frames.size() << " frames, "
           << Quantile(ms, 0.5) << " ms a frame\n";
+  if (judge) {
+    const Tally& tally = judge->tally();
+    summary << tally.right << " of " << tally.frames << " frames right (40 mm), " << tally.right_10mm << " within 10 mm; "
+            << tally.wrong << " of " << tally.detections << " detections wrong\n";
+  }
   WriteResult(options.common, result, summary.str());
 }
 
@@ -142,6 +172,11 @@ void AddRecognise(CLI::App& app, Run& run) {
   verb->add_option("--frames", options->frames, "Which frames: all, even, odd (by id), or ids A:B without B")
       ->capture_default_str();
   verb->add_flag("--no-query-depth", options->no_query_depth, "Use the colour image only");
+  verb->add_option(
+          "--truth-object-id", options->truth_object_id,
+          "Count right and wrong detections (p >= 1/2) by the recording's truth of this object; the store holds one object, "
+          "learned from this recording")
+      ->type_name("N");
   verb->add_option(
           "--bop", options->bop,
           "Write the detections in the BOP challenge's format; obj_id is the number the object's name ends in, else its place in "
