@@ -88,6 +88,9 @@ class FrameReceiver {
   // The newest frame not yet taken, decoded; nullopt where there is none or it cannot be decoded (counted as bad).
   std::optional<ReceivedFrame> Take();
 
+  // Forgets what Take would return; not counted as skipped.
+  void Drop() { newest_.reset(); }
+
   std::int64_t frames() const { return frames_; }    // Whole ones that arrived.
   std::int64_t gaps() const { return gaps_; }        // Frames that did not arrive whole.
   std::int64_t skipped() const { return skipped_; }  // Replaced by a newer one before they were taken.

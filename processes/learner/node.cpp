@@ -1,7 +1,9 @@
 #include "learner/node.h"
 
+#include <algorithm>
 #include <chrono>
 #include <stdexcept>
+#include <vantage/mount_state_t.hpp>
 #include <vantage/operator_command_t.hpp>
 
 #include "common/params.h"
@@ -26,6 +28,7 @@ void LearnerNodeParams::Check() const {
   if (store.empty()) throw std::invalid_argument("store must not be empty");
   if (!target_pixel.empty() && target_pixel.size() != 2) throw std::invalid_argument("target_pixel must be [u, v]");
   if (!(scene_period_s > 0.0)) throw std::invalid_argument("scene_period_s must be > 0");
+  if (!(max_rate_hz > 0.0)) throw std::invalid_argument("max_rate_hz must be > 0");
   learner.Check();
 }
 
@@ -38,6 +41,8 @@ LearnerNodeParams LoadLearnerNodeParams(const std::string& config_file, const st
   yaml.Get("store", params.store);
   yaml.Get("target_pixel", params.target_pixel);
   yaml.Get("scene_period_s", params.scene_period_s);
+  yaml.Get("max_rate_hz", params.max_rate_hz);
+  yaml.Get("learn_in_motion", params.learn_in_motion);
   yaml.Finish();
   yaml.Check(params);
   return params;
@@ -57,11 +62,18 @@ LearnerNode::LearnerNode(messaging::Bus& bus, const LearnerNodeParams& params)
     if (!measures) return Refuse(messaging::kAssessorMeasures, measures.error);
     OnMeasures(*measures);
   });
+  Subscribe<mount_state_t>(messaging::kMountState, [this](const mount_state_t& message) {
+    if (message.moving) moved_until_us_ = std::max(moved_until_us_, message.utime);
+  });
   Subscribe<operator_command_t>(messaging::kOperatorCommand, [this](const operator_command_t& message) {
     if (!message.process.empty() && message.process != process()) return;
     if (message.command == "pause") paused_ = true;
     if (message.command == "resume") paused_ = false;
   });
+}
+
+std::int64_t LearnerNode::NextStep_us() const {
+  return frames_.HasNew() && !paused_ ? std::min(next_frame_us_, next_scene_us_) : next_scene_us_;
 }
 
 std::string LearnerNode::State() const { return paused_ ? "paused" : learning::ToString(last_.result.state); }
@@ -88,8 +100,15 @@ void LearnerNode::OnMeasures(const messaging::ObjectMeasures& measures) {
 void LearnerNode::Step() {
   CountGaps(frames_.gaps());
   CountSkipped(frames_.skipped());
-  if (!paused_) {
-    if (const auto received = frames_.Take()) Process(*received);
+  if (!paused_ && frames_.HasNew() && now_us() >= next_frame_us_) {
+    // Nothing is decoded that is not looked at.
+    const bool in_motion = !params_.learn_in_motion && frames_.newest_utime() <= moved_until_us_;
+    if (in_motion) {
+      frames_.Drop();
+    } else if (const auto received = frames_.Take()) {
+      next_frame_us_ = now_us() + static_cast<std::int64_t>(1e6 / params_.max_rate_hz);
+      Process(*received);
+    }
   }
   if (now_us() < next_scene_us_) return;
   next_scene_us_ = now_us() + static_cast<std::int64_t>(params_.scene_period_s * 1e6);

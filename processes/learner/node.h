@@ -21,6 +21,8 @@ struct LearnerNodeParams {
   std::string store = "models.db";   // File; made where there is none.
   std::vector<double> target_pixel;  // [u, v]: the object to learn is the cluster there; empty: the one nearest to the centre.
   double scene_period_s = 1.0;       // LEARNER_SCENE is sent again so often; > 0.
+  double max_rate_hz = 5.0;          // Frames looked at per second at most; > 0.
+  bool learn_in_motion = false;      // Also frames captured while the mount moves (where there is one) are learned from.
   learning::LearnerParams learner;
 
   void Check() const;  // Throws std::invalid_argument naming the field.
@@ -35,7 +37,7 @@ class LearnerNode : public messaging::Node {
   LearnerNode(messaging::Bus& bus, const LearnerNodeParams& params);
 
   void Step() override;
-  std::int64_t NextStep_us() const override { return next_scene_us_; }
+  std::int64_t NextStep_us() const override;
 
   const learning::Learner& learner() const { return *learner_; }
 
@@ -59,9 +61,11 @@ class LearnerNode : public messaging::Node {
   SceneMap scene_;
   std::int64_t scene_utime_ = 0;
   std::int64_t next_scene_us_ = 0;
+  std::int64_t next_frame_us_ = 0;
   messaging::Track last_;
   std::optional<messaging::ObjectMeasures> saved_measures_;
   bool paused_ = false;
+  std::int64_t moved_until_us_ = 0;  // The mount was moving at this time and before; no mount: never.
 };
 
 }  // namespace vantage::learner

@@ -16,7 +16,7 @@ namespace vantage::recogniser {
 
 struct RecogniserNodeParams {
   std::string store = "models.db";  // File, only read; it may appear later.
-  double max_rate_hz = 2.0;         // Frames looked at per second at most; > 0.
+  double max_rate_hz = 1.0;         // Frames looked at per second at most; > 0.
   double reload_period_s = 2.0;     // The store is looked into so often, beside every LEARNER_VIEW; > 0.
   recognition::RecogniserParams recogniser;
 

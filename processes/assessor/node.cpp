@@ -1,0 +1,247 @@
+#include "assessor/node.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+#include <vantage/answer_t.hpp>
+
+#include "common/params.h"
+#include "messaging/channels.h"
+#include "messaging/geometry_messages.h"
+
+namespace vantage::assessor {
+namespace {
+
+WorkerParams MakeWorkerParams(const AssessorNodeParams& params) {
+  WorkerParams worker;
+  worker.store = params.store;
+  worker.recogniser = params.recogniser;
+  worker.trials = params.trials;
+  worker.plane = params.plane;
+  worker.clusters = params.clusters;
+  worker.max_backgrounds = params.max_backgrounds;
+  worker.niceness = params.niceness;
+  return worker;
+}
+
+double MedianDistance(const std::vector<measures::Viewpoint>& views) {
+  std::vector<double> distances;
+  for (const auto& view : views) distances.push_back(view.distance_m);
+  if (distances.empty()) return 1.0;
+  std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2), distances.end());
+  return distances[distances.size() / 2];
+}
+
+}  // namespace
+
+void AssessorNodeParams::Check() const {
+  const auto require = [](bool ok, const char* what) {
+    if (!ok) throw std::invalid_argument(what);
+  };
+  require(!store.empty(), "store must not be empty");
+  measures::CompletenessRuleFromString(rule);
+  require(azimuth_cells >= 1 && azimuth_cells <= 360, "azimuth_cells must be in 1..360");
+  require(elevation_cells >= 1 && elevation_cells <= 180, "elevation_cells must be in 1..180");
+  require(min_elevation_rad < max_elevation_rad, "min_elevation_rad must be < max_elevation_rad");
+  require(publish_period_s > 0.0, "publish_period_s must be > 0");
+  require(retry_period_s > 0.0, "retry_period_s must be > 0");
+  require(max_backgrounds >= 0, "max_backgrounds must be >= 0");
+  require(niceness >= 0 && niceness <= 19, "niceness must be in 0..19");
+  recogniser.Check();
+  trials.Check();
+}
+
+AssessorNodeParams LoadAssessorNodeParams(const std::string& config_file, const std::string& library_file) {
+  AssessorNodeParams params;
+  if (!library_file.empty()) {
+    const auto library = params::LoadLibraryParams(library_file);
+    params.recogniser = library.recogniser;
+    params.trials = library.trials;
+    params.plane = library.learner.plane;
+    params.clusters = library.learner.clusters;
+  }
+  if (config_file.empty()) return params;
+  auto yaml = config::Mapping::Load(config_file);
+  yaml.Get("store", params.store);
+  yaml.Get("rule", params.rule);
+  yaml.Get("azimuth_cells", params.azimuth_cells);
+  yaml.Get("elevation_cells", params.elevation_cells);
+  yaml.Get("min_elevation_rad", params.min_elevation_rad);
+  yaml.Get("max_elevation_rad", params.max_elevation_rad);
+  yaml.Get("publish_period_s", params.publish_period_s);
+  yaml.Get("retry_period_s", params.retry_period_s);
+  yaml.Get("max_backgrounds", params.max_backgrounds);
+  yaml.Get("niceness", params.niceness);
+  yaml.Finish();
+  yaml.Check(params);
+  return params;
+}
+
+AssessorNode::AssessorNode(messaging::Bus& bus, const AssessorNodeParams& params)
+    : Node(bus, "assessor"),
+      params_((params.Check(), params)),
+      rule_(measures::CompletenessRuleFromString(params.rule)),
+      frames_(bus),
+      worker_(MakeWorkerParams(params)) {
+  Subscribe<track_t>(messaging::kLearnerTrack, [this](const track_t& message) { OnTrack(message); });
+  Subscribe<view_t>(messaging::kLearnerView, [this](const view_t& message) { OnView(message); });
+  Subscribe<reach_t>(messaging::kPlannerReach, [this](const reach_t& message) { OnReach(message); });
+  Subscribe<query_t>(messaging::kAssessorQuery, [this](const query_t& message) { OnQuery(message); });
+}
+
+std::int64_t AssessorNode::NextStep_us() const {
+  return worker_.busy() ? std::min(next_publish_us_, now_us() + 50000) : next_publish_us_;
+}
+
+std::string AssessorNode::State() const { return worker_.busy() ? "assessing" : "idle"; }
+
+std::string AssessorNode::Detail() const {
+  const auto object = objects_.find(current_);
+  if (object == objects_.end()) return "";
+  std::string text = current_ + ": " + std::to_string(object->second.assessed_views) + " of " +
+                     std::to_string(object->second.views) + " views assessed";
+  if (worker_.busy()) text += ", " + std::to_string(static_cast<int>(100.0 * worker_.progress())) + " % of the trials";
+  return text;
+}
+
+void AssessorNode::OnTrack(const track_t& message) {
+  const auto track = messaging::FromMessage(message);
+  if (!track) return Refuse(messaging::kLearnerTrack, track.error);
+  if (track->object.empty()) return;
+  current_ = track->object;
+  Object& object = objects_[current_];
+  // The learner tells of a view before it is durable: only what was there before counts.
+  const int stored = track->views - (track->result.view_added ? 1 : 0);
+  object.views = std::max(object.views, stored);
+  if (track->T_world_object) object.T_world_object = track->T_world_object;
+}
+
+void AssessorNode::OnView(const view_t& message) {
+  const auto view = messaging::FromMessage(message);
+  if (!view) return Refuse(messaging::kLearnerView, view.error);
+  current_ = view->object;
+  Object& object = objects_[current_];
+  object.views = view->views;
+  object.utime = view->utime;
+  if (static_cast<int>(object.viewpoints.size()) + 1 == view->views) object.viewpoints.push_back(view->viewpoint);
+  next_publish_us_ = 0;
+}
+
+void AssessorNode::OnReach(const reach_t& message) {
+  const auto reach = messaging::FromMessage(message);
+  if (!reach) return Refuse(messaging::kPlannerReach, reach.error);
+  objects_[reach->object].reach = reach->viewpoints;
+}
+
+void AssessorNode::OnQuery(const query_t& message) {
+  answer_t answer;
+  answer.utime = now_us();
+  answer.query_id = message.query_id;
+  answer.object = message.object;
+  answer.known = false;
+  answer.probability = 0.0;
+  const auto T_frame_camera = messaging::FromMessage(message.T_frame_camera);
+  const auto object = objects_.find(message.object);
+  if (!T_frame_camera) {
+    answer.error = T_frame_camera.error;
+  } else if (object == objects_.end() || object->second.viewpoints.empty()) {
+    answer.error = "object '" + message.object + "' is not known here";
+  } else if (message.frame != query_t::FRAME_OBJECT && message.frame != query_t::FRAME_WORLD) {
+    answer.error = "frame " + std::to_string(message.frame) + " is unknown";
+  } else if (message.frame == query_t::FRAME_WORLD && !object->second.T_world_object) {
+    answer.error = "where '" + message.object + "' stands in the world is not known";
+  } else {
+    const Object& known = object->second;
+    geometry::Rigid T_object_camera = *T_frame_camera;
+    if (message.frame == query_t::FRAME_WORLD) T_object_camera = known.T_world_object->inverse() * T_object_camera;
+    const double distance_m = T_object_camera.translation().norm();
+    if (distance_m > 0.01) {
+      const measures::Viewpoint viewpoint{T_object_camera.translation() / distance_m, distance_m};
+      answer.known = true;
+      answer.probability = measures::DetectionProbability(known.viewpoints, viewpoint, known.measures.predicted, rule_);
+      answer.source = measures::ToString(known.measures.predicted.source());
+    } else {
+      answer.error = "the camera would be inside the object";
+    }
+  }
+  Count("answers");
+  bus_.Publish(messaging::kAssessorAnswer, answer);
+}
+
+void AssessorNode::Step() {
+  CountGaps(frames_.gaps());
+  if (const auto assessment = worker_.Poll()) OnAssessment(*assessment);
+  if (!worker_.busy()) StartNextJob();
+  if (now_us() < next_publish_us_) return;
+  next_publish_us_ = now_us() + static_cast<std::int64_t>(params_.publish_period_s * 1e6);
+  const auto object = objects_.find(current_);
+  if (object != objects_.end() && !object->second.viewpoints.empty()) Publish(object->first, object->second);
+}
+
+void AssessorNode::StartNextJob() {
+  for (auto& [name, object] : objects_) {
+    if (object.views <= object.assessed_views || now_us() < object.not_before_us) continue;
+    if (!std::filesystem::exists(params_.store)) {
+      NoteError("the learner has views of '" + name + "', but there is no store " + params_.store + ": give both the same --store");
+      object.not_before_us = now_us() + static_cast<std::int64_t>(params_.retry_period_s * 1e6);
+      continue;
+    }
+    auto received = frames_.Take();
+    worker_.Start(name, received ? std::optional<rgbd::Frame>(std::move(received->frame)) : std::nullopt);
+    return;
+  }
+}
+
+void AssessorNode::OnAssessment(const Assessment& assessment) {
+  Object& object = objects_[assessment.object];
+  if (!assessment.error.empty()) {
+    NoteError(assessment.error);
+    object.not_before_us = now_us() + static_cast<std::int64_t>(params_.retry_period_s * 1e6);
+    return;
+  }
+  object.measures = assessment.measures;
+  object.assessed_views = assessment.assessed_views;
+  object.views = std::max(object.views, static_cast<int>(assessment.views.size()));
+  // Views may have come in meanwhile: theirs stay.
+  if (object.viewpoints.size() <= assessment.views.size()) {
+    object.viewpoints = assessment.views;
+    object.utime = assessment.utime;
+  }
+  Count("assessments");
+  next_publish_us_ = 0;
+}
+
+double AssessorNode::CompletenessOf(const Object& object) const {
+  const auto queries = object.reach.empty() ? assessment::UniformViewpoints(params_.min_elevation_rad, params_.max_elevation_rad,
+                                                                            {MedianDistance(object.viewpoints)})
+                                            : object.reach;
+  return measures::Completeness(object.viewpoints, queries, object.measures.predicted, rule_);
+}
+
+void AssessorNode::Publish(const std::string& name, const Object& object) {
+  messaging::ObjectCompleteness completeness;
+  completeness.utime = object.utime;
+  completeness.object = name;
+  completeness.rule = rule_;
+  completeness.completeness = CompletenessOf(object);
+  completeness.reach_known = !object.reach.empty();
+  completeness.distance_m = MedianDistance(object.viewpoints);
+  completeness.sphere = geometry::ViewSphere(params_.azimuth_cells, params_.elevation_cells);
+  for (int cell = 0; cell < completeness.sphere.size(); ++cell) {
+    const measures::Viewpoint query{completeness.sphere.Direction(cell), completeness.distance_m};
+    completeness.cells.push_back(measures::DetectionProbability(object.viewpoints, query, object.measures.predicted, rule_));
+  }
+  completeness.views = object.viewpoints;
+  bus_.Publish(messaging::kAssessorCompleteness, messaging::ToMessage(completeness));
+
+  if (object.assessed_views == 0) return;
+  messaging::ObjectMeasures measures;
+  measures.utime = object.utime;
+  measures.object = name;
+  measures.views = object.assessed_views;
+  measures.measures = object.measures;
+  measures.completeness = completeness.completeness;
+  bus_.Publish(messaging::kAssessorMeasures, messaging::ToMessage(measures));
+}
+
+}  // namespace vantage::assessor

@@ -1,0 +1,83 @@
+// The assessor: learns how well an object is known from virtual views, and answers how likely it would be detected from elsewhere.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vantage/query_t.hpp>
+
+#include "assessor/worker.h"
+#include "messaging/assessor_messages.h"
+#include "messaging/frame_link.h"
+#include "messaging/learner_messages.h"
+#include "messaging/node.h"
+
+namespace vantage::assessor {
+
+struct AssessorNodeParams {
+  std::string store = "models.db";  // File, only read; it may appear later.
+  std::string rule = "max";         // How the views' probabilities combine: max, noisy_or, clipped_sum.
+  int azimuth_cells = 36;           // Of the sphere that is published; 1..360.
+  int elevation_cells = 18;         // Likewise; 1..180.
+  double min_elevation_rad = 0.17;  // Until PLANNER_REACH says what can be seen: the sphere between these...
+  double max_elevation_rad = 1.4;   // ...counts.
+  double publish_period_s = 1.0;    // > 0.
+  double retry_period_s = 5.0;      // After an error; > 0.
+  int max_backgrounds = 8;          // Of the run's own frames; >= 0.
+  int niceness = 5;                 // Of the thread that runs trials; 0..19.
+  recognition::RecogniserParams recogniser;
+  assessment::TrialParams trials;
+  segmentation::PlaneParams plane;
+  segmentation::ClusterParams clusters;
+
+  void Check() const;  // Throws std::invalid_argument naming the field.
+};
+
+// `config_file`: the fields above down to niceness; the others are in `library_file`. Either may be empty. Throws
+// std::runtime_error.
+AssessorNodeParams LoadAssessorNodeParams(const std::string& config_file, const std::string& library_file);
+
+class AssessorNode : public messaging::Node {
+ public:
+  AssessorNode(messaging::Bus& bus, const AssessorNodeParams& params);
+
+  void Step() override;
+  std::int64_t NextStep_us() const override;
+
+ protected:
+  std::string State() const override;
+  std::string Detail() const override;
+
+ private:
+  // What is known of one object.
+  struct Object {
+    int views = 0;           // In the store, as the learner says.
+    int assessed_views = 0;  // Whose trials are in the measures.
+    std::int64_t utime = 0;  // Capture time of the newest view.
+    std::vector<measures::Viewpoint> viewpoints;
+    measures::Measures measures;
+    std::vector<measures::WeightedViewpoint> reach;  // Empty: not known.
+    std::optional<geometry::Rigid> T_world_object;
+    std::int64_t not_before_us = 0;  // Of the next try.
+  };
+
+  void OnTrack(const track_t& message);
+  void OnView(const view_t& message);
+  void OnReach(const reach_t& message);
+  void OnQuery(const query_t& message);
+  void OnAssessment(const Assessment& assessment);
+  void StartNextJob();
+  void Publish(const std::string& name, const Object& object);
+  double CompletenessOf(const Object& object) const;
+
+  AssessorNodeParams params_;
+  measures::CompletenessRule rule_;
+  messaging::FrameReceiver frames_;
+  std::map<std::string, Object> objects_;
+  std::string current_;  // What the learner is at.
+  std::int64_t next_publish_us_ = 0;
+  Worker worker_;  // Last: its thread ends first.
+};
+
+}  // namespace vantage::assessor

@@ -1,0 +1,128 @@
+#include "assessor/worker.h"
+
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+
+#include "assessment/background.h"
+
+namespace vantage::assessor {
+namespace {
+
+struct BrokenOff {};
+
+}  // namespace
+
+Worker::Worker(const WorkerParams& params) : params_(params), thread_([this] { Run(); }) {}
+
+Worker::~Worker() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+void Worker::Start(const std::string& object, std::optional<rgbd::Frame> frame) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (busy_) throw std::logic_error("assessor: a job is under way");
+    job_ = object;
+    job_frame_ = std::move(frame);
+    progress_ = 0.0;
+    busy_ = true;
+  }
+  wake_.notify_all();
+}
+
+std::optional<Assessment> Worker::Poll() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::optional<Assessment> result;
+  result.swap(result_);
+  return result;
+}
+
+void Worker::Run() {
+  // On Linux a niceness is a thread's own.
+  setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), params_.niceness);
+  while (true) {
+    std::string object;
+    std::optional<rgbd::Frame> frame;
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      wake_.wait(lock, [this] { return stop_ || job_; });
+      if (stop_) return;
+      object = std::move(*job_);
+      frame = std::move(job_frame_);
+      job_.reset();
+      job_frame_.reset();
+    }
+    Assessment assessment;
+    try {
+      assessment = Assess(object, frame);
+    } catch (const BrokenOff&) {
+      return;
+    } catch (const std::exception& error) {
+      assessment.error = error.what();
+    }
+    assessment.object = object;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    result_ = std::move(assessment);
+    busy_ = false;
+  }
+}
+
+Worker::Known& Worker::Read(const std::string& object) {
+  Known& known = known_[object];
+  if (known.model && known.view_ids.size() < known.model->views.size()) return known;
+  const model::Store store(params_.store, model::Store::Mode::kRead);
+  auto model = store.Load(object);
+  if (!model || model->views.empty()) throw std::runtime_error(params_.store + ": no views of '" + object + "'");
+  const auto same = [](int id, const model::View& view) { return id == view.id; };
+  const bool grown = known.view_ids.size() <= model->views.size() &&
+                     std::equal(known.view_ids.begin(), known.view_ids.end(), model->views.begin(), same);
+  if (!grown) known = Known();  // The object was learned anew.
+  known.model = std::make_shared<const model::ObjectModel>(std::move(*model));
+  return known;
+}
+
+Assessment Worker::Assess(const std::string& object, const std::optional<rgbd::Frame>& frame) {
+  if (frame) AddBackground(*frame);
+  Known& known = Read(object);
+  const int next = static_cast<int>(known.view_ids.size());
+  if (next < static_cast<int>(known.model->views.size())) {
+    std::vector<int> first_views(static_cast<std::size_t>(next) + 1);
+    std::iota(first_views.begin(), first_views.end(), 0);
+    const auto trials = assessment::RunTrials(known.model->OnlyViews(first_views), next, backgrounds_, params_.recogniser,
+                                              params_.trials, [this](int done, int of) {
+                                                if (stop_) throw BrokenOff();
+                                                progress_ = static_cast<double>(done) / of;
+                                              });
+    known.trials.insert(known.trials.end(), trials.begin(), trials.end());
+    known.view_ids.push_back(known.model->views[static_cast<std::size_t>(next)].id);
+  }
+
+  Assessment result;
+  result.utime = known.model->views.back().utime;
+  result.views = known.model->viewpoints();
+  result.assessed_views = static_cast<int>(known.view_ids.size());
+  result.measures = assessment::FitMeasures(known.trials, params_.recogniser);
+  result.trials = static_cast<int>(known.trials.size());
+  return result;
+}
+
+void Worker::AddBackground(const rgbd::Frame& frame) {
+  if (static_cast<int>(backgrounds_.size()) >= params_.max_backgrounds) return;
+  const auto plane = segmentation::FitPlane(frame, params_.plane);
+  if (!plane) return;  // Where objects cannot be masked, they would be taken for background.
+  cv::Mat objects = cv::Mat::zeros(frame.color.size(), CV_8UC1);
+  for (const auto& cluster : segmentation::FindClusters(frame, *plane, params_.clusters)) objects |= cluster.mask;
+  backgrounds_.push_back(assessment::MaskedBackground(frame.color, objects));
+}
+
+}  // namespace vantage::assessor

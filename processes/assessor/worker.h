@@ -1,0 +1,88 @@
+// Runs the virtual trials of an object on a thread of its own, so that the assessor stays responsive.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "assessment/assessor.h"
+#include "model/store.h"
+#include "rgbd/frame.h"
+#include "segmentation/clusters.h"
+#include "segmentation/plane.h"
+
+namespace vantage::assessor {
+
+struct WorkerParams {
+  std::string store;
+  recognition::RecogniserParams recogniser;
+  assessment::TrialParams trials;
+  segmentation::PlaneParams plane;  // To find what is background in the run's own frames.
+  segmentation::ClusterParams clusters;
+  int max_backgrounds = 8;  // >= 0.
+  int niceness = 5;         // Of the thread: sensor and learner go first; 0..19.
+};
+
+// What became of one job.
+struct Assessment {
+  std::string object;
+  std::string error;                       // Empty where it worked; then:
+  std::int64_t utime = 0;                  // Capture time of the newest view in the store.
+  std::vector<measures::Viewpoint> views;  // In the store.
+  int assessed_views = 0;                  // The first so many of them have had their trials.
+  measures::Measures measures;
+  int trials = 0;  // All that the fit is made of.
+};
+
+// The thread only computes: it reads the store and touches no bus. Trials of views assessed before are kept, so that a job costs
+// what is new.
+class Worker {
+ public:
+  explicit Worker(const WorkerParams& params);
+  ~Worker();  // Breaks off what is under way; returns within one trial.
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  // Assesses the first view of the object that has had no trials yet. `frame`: a background is cut from it; may be empty. Not while
+  // busy.
+  void Start(const std::string& object, std::optional<rgbd::Frame> frame);
+  bool busy() const { return busy_; }
+  double progress() const { return progress_; }  // Of the job under way, [0, 1].
+  // The result, once.
+  std::optional<Assessment> Poll();
+
+ private:
+  struct Known {
+    std::shared_ptr<const model::ObjectModel> model;  // As last read from the store.
+    std::vector<int> view_ids;                        // That have had their trials.
+    std::vector<assessment::Trial> trials;
+  };
+
+  void Run();
+  Assessment Assess(const std::string& object, const std::optional<rgbd::Frame>& frame);
+  // Reads the store where all views known were assessed.
+  Known& Read(const std::string& object);
+  void AddBackground(const rgbd::Frame& frame);
+
+  WorkerParams params_;
+  std::map<std::string, Known> known_;  // The thread's own.
+  std::vector<cv::Mat> backgrounds_;    // Likewise.
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::optional<std::string> job_;
+  std::optional<rgbd::Frame> job_frame_;
+  std::optional<Assessment> result_;
+  std::atomic<bool> busy_{false};
+  std::atomic<bool> stop_{false};
+  std::atomic<double> progress_{0.0};
+  std::thread thread_;
+};
+
+}  // namespace vantage::assessor

@@ -1,0 +1,59 @@
+#include <stdexcept>
+
+#include "common/params.h"
+#include "planner/node.h"
+
+namespace vantage::planner {
+
+void PlannerNodeParams::Check() const {
+  const auto require = [](bool ok, const char* what) {
+    if (!ok) throw std::invalid_argument(what);
+  };
+  require(strategy == "planner" || strategy == "random", "strategy must be planner or random");
+  require(wait_s > 0.0, "wait_s must be > 0");
+  require(measures_wait_s >= 0.0, "measures_wait_s must be >= 0");
+  require(settle_s >= 0.0, "settle_s must be >= 0");
+  require(look_frames >= 1, "look_frames must be >= 1");
+  require(look_s > 0.0, "look_s must be > 0");
+  require(silence_s > 0.0, "silence_s must be > 0");
+  require(resend_s > 0.0, "resend_s must be > 0");
+  require(max_refusals >= 1, "max_refusals must be >= 1");
+  require(publish_period_s > 0.0, "publish_period_s must be > 0");
+  require(table_size_m > 0.0, "table_size_m must be > 0");
+  require(table_height_m > 0.0, "table_height_m must be > 0");
+  planner.Check();
+  candidates.Check();
+  mount.Check();
+}
+
+PlannerNodeParams LoadPlannerNodeParams(const std::string& config_file, const std::string& library_file) {
+  PlannerNodeParams params;
+  if (!library_file.empty()) {
+    const auto library = params::LoadLibraryParams(library_file);
+    params.planner = library.planner;
+    params.candidates = library.candidates;
+    params.mount = library.mount;
+  }
+  if (config_file.empty()) return params;
+  auto yaml = config::Mapping::Load(config_file);
+  yaml.Get("strategy", params.strategy);
+  yaml.Get("seed", params.seed);
+  yaml.Get("wait_s", params.wait_s);
+  yaml.Get("measures_wait_s", params.measures_wait_s);
+  yaml.Get("settle_s", params.settle_s);
+  yaml.Get("look_frames", params.look_frames);
+  yaml.Get("look_s", params.look_s);
+  yaml.Get("silence_s", params.silence_s);
+  yaml.Get("resend_s", params.resend_s);
+  yaml.Get("max_refusals", params.max_refusals);
+  yaml.Get("publish_period_s", params.publish_period_s);
+  yaml.Get("table_size_m", params.table_size_m);
+  yaml.Get("table_height_m", params.table_height_m);
+  yaml.Get("summary", params.summary);
+  yaml.Get("exit_when_done", params.exit_when_done);
+  yaml.Finish();
+  yaml.Check(params);
+  return params;
+}
+
+}  // namespace vantage::planner
