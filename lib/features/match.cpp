@@ -13,10 +13,10 @@ constexpr int kTrainRows = 4;   // Train rows per step; 2 x 4 sums stay in regis
 
 typedef float Lanes __attribute__((vector_size(kLanes * sizeof(float)), aligned(4)));
 
-// Inner products of 4 train rows with 16 query rows. `queries` is transposed: value i of all query rows, then value i + 1; so no sum runs
-// across a register. The compiler makes one version for AVX2 and one for any machine, and picks at run time.
-__attribute__((target_clones("arch=x86-64-v3", "default"))) void InnerProducts(const float* queries, const float* const* train, int length,
-                                                                             float* products) {
+// Inner products of 4 train rows with 16 query rows. `queries` is transposed: value i of all query rows, then value i + 1; so no
+// sum runs across a register. The compiler makes one version for AVX2 and one for any machine, and picks at run time.
+__attribute__((target_clones("arch=x86-64-v3", "default"))) void InnerProducts(const float* queries, const float* const* train,
+                                                                               int length, float* products) {
   Lanes low[kTrainRows] = {}, high[kTrainRows] = {};
   for (int i = 0; i < length; ++i) {
     const Lanes q_low = *reinterpret_cast<const Lanes*>(queries + i * kQueryRows);
@@ -61,8 +61,8 @@ std::vector<NearestPair> NearestTwo(const cv::Mat& query, const cv::Mat& train, 
   std::vector<NearestPair> nearest(query.rows);
   if (query.rows == 0 || train.rows == 0) return nearest;
   if (query.type() != CV_32F || train.type() != CV_32F || query.cols != train.cols) {
-    throw std::invalid_argument("features: descriptors must be CV_32F rows of one length; found " +
-                                std::to_string(query.cols) + " and " + std::to_string(train.cols));
+    throw std::invalid_argument("features: descriptors must be CV_32F rows of one length; found " + std::to_string(query.cols) +
+                                " and " + std::to_string(train.cols));
   }
   if (!groups.empty() && static_cast<int>(groups.size()) != train.rows) {
     throw std::invalid_argument("features: groups must name every train row");

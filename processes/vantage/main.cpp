@@ -29,7 +29,7 @@ std::string VerbName(const CLI::App& app) {
 std::string UnknownVerb(const CLI::App& app, int argc, char** argv) {
   const CLI::App* verb = &app;
   for (int i = 1; i < argc && argv[i][0] != '-' && verb->get_require_subcommand_min() > 0; ++i) {
-    const std::string word = argv[i];
+    std::string word = argv[i];
     const auto named = verb->get_subcommands([&](const CLI::App* candidate) { return candidate->get_name() == word; });
     if (named.empty()) return word;
     verb = named.front();

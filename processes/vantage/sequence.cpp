@@ -15,7 +15,7 @@ constexpr double kInsidePx = 2.0;  // A target pixel is at least this far inside
 std::optional<Eigen::Vector2d> ProjectedOrigin(const rgbd::BopScene& scene, const rgbd::Frame& frame, int object_id) {
   const auto T_camera_mesh = TruthOf(scene, static_cast<int>(frame.id), object_id);
   if (!T_camera_mesh) return std::nullopt;
-  const auto pixel = frame.camera.Project(T_camera_mesh->translation());
+  auto pixel = frame.camera.Project(T_camera_mesh->translation());
   if (!pixel || !frame.camera.Contains(*pixel)) return std::nullopt;
   return pixel;
 }
