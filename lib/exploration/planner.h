@@ -23,7 +23,7 @@
 namespace vantage::exploration {
 
 struct PlannerParams {
-  double worth_s = 600.0;                // Seconds that raising completeness from 0 to 1 is worth to this robot; > 0.
+  double worth_s = 1500.0;               // Seconds that raising completeness from 0 to 1 is worth to this robot; > 0.
   double target_completeness = 0.97;     // Stop here; (0, 1].
   double min_detect_probability = 0.25;  // Learning attempts less likely than this are not made; [0, 1).
   double t_plan_s = 0.5;                 // First guess of the time one decision takes; >= 0. The mean of...

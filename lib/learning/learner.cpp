@@ -54,6 +54,7 @@ void LearnerParams::Check() const {
   require(roi_margin >= 0.0, "roi_margin must be >= 0");
   require(max_mount_translation_m > 0.0, "max_mount_translation_m must be > 0");
   require(max_mount_rotation_deg > 0.0, "max_mount_rotation_deg must be > 0");
+  require(agreement_prior >= 0.5 && agreement_prior < 1.0, "agreement_prior must be in [1/2, 1)");
 }
 
 struct Learner::Impl {
@@ -209,24 +210,44 @@ struct Learner::Impl {
     return Judge(frame, std::move(features), detections.front().T_camera_object, true);
   }
 
-  bool ContradictsMount(const rgbd::Frame& frame, const geometry::Rigid& T_camera_object) const {
-    const auto expected = MountPose(frame);
-    if (!params.require_mount_agreement || !expected) return false;
-    const geometry::PoseDifference difference = geometry::Difference(T_camera_object, *expected);
-    return difference.translation_m > params.max_mount_translation_m ||
-           difference.rotation_rad > params.max_mount_rotation_deg * M_PI / 180.0;
+  bool AgreesWithMount(const geometry::Rigid& T_camera_object, const geometry::Rigid& expected) const {
+    const geometry::PoseDifference difference = geometry::Difference(T_camera_object, expected);
+    return difference.translation_m <= params.max_mount_translation_m &&
+           difference.rotation_rad <= params.max_mount_rotation_deg * M_PI / 180.0;
   }
 
+  bool ContradictsMount(const rgbd::Frame& frame, const geometry::Rigid& T_camera_object) const {
+    const auto expected = MountPose(frame);
+    return params.require_mount_agreement && expected && !AgreesWithMount(T_camera_object, *expected);
+  }
+
+  // A pose that was found without the mount and agrees with it is right far more often than one that is merely as confident.
+  void CreditAgreement(const rgbd::Frame& frame, std::optional<Track>* track) const {
+    const auto expected = MountPose(frame);
+    if (!*track || !expected || !AgreesWithMount((*track)->T_camera_object, *expected)) return;
+    (*track)->probability = object->measures.observed.Probability((*track)->confidence.value, params.agreement_prior);
+  }
+
+  bool IsGood(const rgbd::Frame& frame, const std::optional<Track>& track) const {
+    return track && track->probability >= kSeen && !ContradictsMount(frame, track->T_camera_object);
+  }
+
+  // The reference view first, then the whole model where the mount says it is, then the whole model anywhere.
   std::optional<Track> Find(const rgbd::Frame& frame) const {
     const auto mount_pose = MountPose(frame);
     const auto expected = mount_pose ? mount_pose : last_pose;
     if (expected && reference_view >= 0) {
-      features::Features features =
+      const features::Features features =
           features::Extract(rgbd::Gray(frame), RegionOfInterest(frame, expected), params.recogniser.features);
-      auto track = TrackReference(frame, std::move(features));
-      if (track && track->probability >= kSeen && !ContradictsMount(frame, track->T_camera_object)) return track;
+      auto track = TrackReference(frame, features);
+      CreditAgreement(frame, &track);
+      if (IsGood(frame, track)) return track;
+      if (mount_pose) track = Judge(frame, features, *mount_pose, true);
+      if (mount_pose && static_cast<int>(track->matches.size()) >= params.recogniser.min_inliers && IsGood(frame, track)) return track;
     }
-    return Relocalise(frame);
+    auto track = Relocalise(frame);
+    CreditAgreement(frame, &track);
+    return track;
   }
 
   // --- New views ---

@@ -22,10 +22,11 @@ struct LearnerParams {
   int min_view_points = 20;            // A view needs so many interest points with depth; >= 4.
   double min_view_angle_deg =
       10.0;  // A new view differs from every other by so much in direction (or by a third of an octave in distance); >= 0.
-  double max_mount_translation_m =
-      0.05;  // Where the mount's pose is known, a track that contradicts it by more is not trusted; > 0.
-  double max_mount_rotation_deg = 10.0;
-  bool require_mount_agreement = true;  // Use the check above where poses are known.
+  // Where the mount's pose is known:
+  bool require_mount_agreement = true;    // A track that contradicts it by more than this is not trusted.
+  double max_mount_translation_m = 0.03;  // > 0.
+  double max_mount_rotation_deg = 6.0;    // > 0.
+  double agreement_prior = 0.9;           // p(o) of a pose found without it that agrees with it; [1/2, 1).
   int surface_samples = 1000;           // Points of the learned surface that are drawn to the depth image; 0 = none.
   int surface_views = 3;                // ...taken from so many nearest views; >= 1.
   double roi_margin = 0.25;  // Interest points are sought this share of the object's size around where it is expected; >= 0.

@@ -41,6 +41,7 @@ TEST(Planner, EveryCandidateCarriesItsOwnReasons) {
        {measures::CompletenessRule::kMax, measures::CompletenessRule::kNoisyOr, measures::CompletenessRule::kClippedSum}) {
     SCOPED_TRACE(ToString(rule));
     PlannerParams params;
+    params.worth_s = 600.0;
     params.rule = rule;
     params.max_path_goals = 3;
     Belief belief = BeliefFrom({ring[0], ring[5], ring[30]}, ring);
