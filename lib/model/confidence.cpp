@@ -9,18 +9,13 @@
 namespace vantage::model {
 namespace {
 
-// Projected pixel of a model point where it can be seen from this pose; nullopt where it faces away, lies outside the image or is
-// hidden by something nearer.
-std::optional<Eigen::Vector2d> VisiblePixel(const ModelPoint& point, const geometry::Rigid& T_camera_object,
-                                            const rgbd::Frame& frame, const ConfidenceParams& params) {
-  const Eigen::Vector3d in_camera = T_camera_object * point.position;
+// Whether a point faces the camera and nothing nearer is measured in front of it: it ought to be seen there if the pose is right.
+bool OughtToBeSeen(const ModelPoint& point, const Eigen::Vector3d& in_camera, const std::optional<Eigen::Vector2d>& pixel,
+                   const geometry::Rigid& T_camera_object, const rgbd::Frame& frame, const ConfidenceParams& params) {
   const Eigen::Vector3d normal = T_camera_object.linear() * point.normal;
-  if (-normal.dot(in_camera.normalized()) < std::cos(params.max_incidence_deg * M_PI / 180.0)) return std::nullopt;
-  const auto pixel = frame.camera.Project(in_camera);
-  if (!pixel || !frame.camera.Contains(*pixel)) return std::nullopt;
-  const auto depth = rgbd::DepthAt(frame, *pixel, 0);
-  if (depth && *depth < in_camera.z() - params.occlusion_m) return std::nullopt;
-  return pixel;
+  if (-normal.dot(in_camera.normalized()) < std::cos(params.max_incidence_deg * M_PI / 180.0)) return false;
+  const auto depth = pixel ? rgbd::DepthAt(frame, *pixel, 0) : std::nullopt;
+  return !depth || *depth >= in_camera.z() - params.occlusion_m;
 }
 
 }  // namespace
@@ -83,10 +78,12 @@ Confidence ViewConfidence(const ObjectModel& model, int view, const geometry::Ri
   const double zoom = frame.camera.fx / seen.keyframe.camera.fx;
   for (size_t k = 0; k < seen.points.size(); ++k) {
     const ModelPoint& point = model.points[seen.points[k]];
-    const auto pixel = VisiblePixel(point, T_camera_object, frame, params);
-    if (!pixel) continue;
+    const Eigen::Vector3d in_camera = T_camera_object * point.position;
+    const auto pixel = frame.camera.Project(in_camera);
+    if (!OughtToBeSeen(point, in_camera, pixel, T_camera_object, frame, params)) continue;
     ++confidence.visible;
-    const double nearer = (seen.T_camera_object * point.position).z() / (T_camera_object * point.position).z();
+    if (!pixel || !frame.camera.Contains(*pixel)) continue;  // Outside the image nothing speaks for the pose.
+    const double nearer = (seen.T_camera_object * point.position).z() / in_camera.z();
     const double size = seen.features.keypoints[k].size * zoom * nearer;
     confidence.support += keypoints.HasNear(*pixel, params.support_px, size, params.max_scale_ratio);
   }

@@ -43,7 +43,8 @@ struct Confidence {
   double value = 0.0;  // c_i, [0, 1].
   int view = -1;       // Index of the view j that gives the maximum; -1 where none has enough visible points.
   int support = 0;     // n_support,ij.
-  int visible = 0;     // n_model,ij.
+  int visible = 0;     // n_model,ij: points that face the camera and are not hidden; also those outside the image, where nothing
+                       // can speak for the pose: an object that is mostly cut off is not detected surely.
 };
 
 // c_ij of one view. `frame` gives camera and, where present, depth.

@@ -174,7 +174,7 @@ struct Recogniser::Impl {
       }
       const auto estimate =
           pose::EstimatePose(points, frame.camera, params.use_query_depth ? &frame : nullptr, params.ransac, params.seed);
-      if (!estimate) continue;
+      if (!estimate || static_cast<int>(estimate->inliers.size()) < params.min_inliers) continue;
       const auto detection = Verify(known, frame, features, grid, estimate->T_camera_object);
       if (detection && (!best || detection->inliers > best->inliers)) best = detection;
     }
