@@ -22,9 +22,16 @@ void Node::Refuse(const std::string& channel, const std::string& why) {
 }
 
 std::int64_t Node::bad() const {
-  std::int64_t bad = refused_;
+  std::int64_t bad = refused_ + bad_frames_;
   for (const auto* counts : subscriptions_) bad += counts->bad;
   return bad;
+}
+
+void Node::CountFrames(const FrameReceiver& frames) {
+  gaps_ = frames.gaps();
+  skipped_ = frames.skipped();
+  if (frames.bad() > bad_frames_) NoteError(frames.last_error());
+  bad_frames_ = frames.bad();
 }
 
 void Node::CollectSubscriptionErrors() {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "messaging/bus.h"
+#include "messaging/frame_link.h"
 
 namespace vantage::messaging {
 
@@ -53,8 +54,8 @@ class Node {
   // A message whose values are out of range.
   void Refuse(const std::string& channel, const std::string& why);
   void Count(const std::string& counter, std::int64_t by = 1) { counters_[counter].total += by; }
-  void CountGaps(std::int64_t total) { gaps_ = total; }
-  void CountSkipped(std::int64_t total) { skipped_ = total; }
+  // Takes over what the receiver of this node's frames has counted.
+  void CountFrames(const FrameReceiver& frames);
   std::int64_t now_us() const { return bus_.now_us(); }
 
   Bus& bus_;
@@ -74,6 +75,7 @@ class Node {
   std::int64_t started_us_ = 0;
   std::int64_t last_status_us_ = 0;
   std::int64_t refused_ = 0;
+  std::int64_t bad_frames_ = 0;
   std::int64_t gaps_ = 0;
   std::int64_t skipped_ = 0;
   std::string last_error_;

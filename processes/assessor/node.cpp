@@ -169,7 +169,7 @@ void AssessorNode::OnQuery(const query_t& message) {
 }
 
 void AssessorNode::Step() {
-  CountGaps(frames_.gaps());
+  CountFrames(frames_);
   if (const auto assessment = worker_.Poll()) OnAssessment(*assessment);
   if (!worker_.busy()) StartNextJob();
   if (now_us() < next_publish_us_) return;

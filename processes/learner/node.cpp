@@ -98,8 +98,7 @@ void LearnerNode::OnMeasures(const messaging::ObjectMeasures& measures) {
 }
 
 void LearnerNode::Step() {
-  CountGaps(frames_.gaps());
-  CountSkipped(frames_.skipped());
+  CountFrames(frames_);
   if (!paused_ && frames_.HasNew() && now_us() >= next_frame_us_) {
     // Nothing is decoded that is not looked at.
     const bool in_motion = !params_.learn_in_motion && frames_.newest_utime() <= moved_until_us_;

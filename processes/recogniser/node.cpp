@@ -69,8 +69,7 @@ void RecogniserNode::Reload() {
 }
 
 void RecogniserNode::Step() {
-  CountGaps(frames_.gaps());
-  CountSkipped(frames_.skipped());
+  CountFrames(frames_);
   if (now_us() >= next_reload_us_) {
     next_reload_us_ = now_us() + static_cast<std::int64_t>(params_.reload_period_s * 1e6);
     Reload();
