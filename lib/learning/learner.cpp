@@ -54,6 +54,8 @@ void LearnerParams::Check() const {
   require(roi_margin >= 0.0, "roi_margin must be >= 0");
   require(max_mount_translation_m > 0.0, "max_mount_translation_m must be > 0");
   require(max_mount_rotation_deg > 0.0, "max_mount_rotation_deg must be > 0");
+  require(mount_sigma_m > 0.0, "mount_sigma_m must be > 0");
+  require(mount_sigma_deg > 0.0, "mount_sigma_deg must be > 0");
   require(agreement_prior >= 0.5 && agreement_prior < 1.0, "agreement_prior must be in [1/2, 1)");
 }
 
@@ -147,10 +149,19 @@ struct Learner::Impl {
     return mask;
   }
 
-  // The guided pose, drawn to the depth image by the surfaces of the nearest views.
-  geometry::Rigid OnSurface(const rgbd::Frame& frame, const features::Features& features,
-                            const recognition::GuidedPose& guided) const {
-    if (frame.depth.empty() || params.surface_samples == 0) return guided.T_camera_object;
+  std::vector<pose::SurfacePoint> SurfaceNear(const geometry::Rigid& T_camera_object) const {
+    std::vector<pose::SurfacePoint> surface;
+    const std::vector<int> nearest = model::NearestViews(*object, T_camera_object, params.surface_views);
+    for (const int view : nearest) {
+      const auto part = SurfaceOfView(object->views[view], params.surface_samples / static_cast<int>(nearest.size()));
+      surface.insert(surface.end(), part.begin(), part.end());
+    }
+    return surface;
+  }
+
+  // The guided pose, drawn to the depth image by the surfaces of the nearest views and, where it agrees, to the mount's pose.
+  geometry::Rigid Refined(const rgbd::Frame& frame, const features::Features& features,
+                          const recognition::GuidedPose& guided) const {
     std::vector<pose::Match2d3d> matches;
     std::vector<int> all;
     for (const recognition::GuidedMatch& match : guided.matches) {
@@ -159,12 +170,14 @@ struct Learner::Impl {
       matches.push_back({{pixel.x, pixel.y}, object->points[match.point].position, 0.0});
     }
     std::vector<pose::SurfacePoint> surface;
-    const std::vector<int> nearest = model::NearestViews(*object, guided.T_camera_object, params.surface_views);
-    for (const int view : nearest) {
-      const auto part = SurfaceOfView(object->views[view], params.surface_samples / static_cast<int>(nearest.size()));
-      surface.insert(surface.end(), part.begin(), part.end());
+    if (!frame.depth.empty() && params.surface_samples > 0) surface = SurfaceNear(guided.T_camera_object);
+    std::optional<pose::PosePrior> prior;
+    const auto expected = MountPose(frame);
+    if (expected && AgreesWithMount(guided.T_camera_object, *expected)) {
+      prior = pose::PosePrior{*expected, params.mount_sigma_m, params.mount_sigma_deg * M_PI / 180.0};
     }
-    return pose::RefinePoseOnSurface(matches, all, surface, frame, guided.T_camera_object,
+    if (surface.empty() && !prior) return guided.T_camera_object;
+    return pose::RefinePoseOnSurface(matches, all, surface, frame, prior, guided.T_camera_object,
                                      0.5 * params.recogniser.ransac.inlier_px);
   }
 
@@ -180,7 +193,7 @@ struct Learner::Impl {
     if (!params.recogniser.use_query_depth) query.depth = cv::Mat();
     const auto guided = recognition::MatchGuided(*object, T_camera_object, query, features, grid, guided_params);
     track.matches = guided.matches;
-    track.T_camera_object = refine ? OnSurface(query, features, guided) : T_camera_object;
+    track.T_camera_object = refine ? Refined(query, features, guided) : T_camera_object;
     track.confidence = model::ObjectConfidence(*object, track.T_camera_object, query, grid, params.recogniser.confidence);
     track.probability = object->measures.observed.Probability(track.confidence.value);
     track.features = std::move(features);
@@ -243,7 +256,8 @@ struct Learner::Impl {
       CreditAgreement(frame, &track);
       if (IsGood(frame, track)) return track;
       if (mount_pose) track = Judge(frame, features, *mount_pose, true);
-      if (mount_pose && static_cast<int>(track->matches.size()) >= params.recogniser.min_inliers && IsGood(frame, track)) return track;
+      if (mount_pose && static_cast<int>(track->matches.size()) >= params.recogniser.min_inliers && IsGood(frame, track))
+        return track;
     }
     auto track = Relocalise(frame);
     CreditAgreement(frame, &track);

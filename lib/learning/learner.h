@@ -26,9 +26,11 @@ struct LearnerParams {
   bool require_mount_agreement = true;    // A track that contradicts it by more than this is not trusted.
   double max_mount_translation_m = 0.03;  // > 0.
   double max_mount_rotation_deg = 6.0;    // > 0.
+  double mount_sigma_m = 0.003;           // How well it knows where the camera is: a pose that agrees is drawn to it; > 0.
+  double mount_sigma_deg = 0.3;           // > 0.
   double agreement_prior = 0.9;           // p(o) of a pose found without it that agrees with it; [1/2, 1).
-  int surface_samples = 1000;           // Points of the learned surface that are drawn to the depth image; 0 = none.
-  int surface_views = 3;                // ...taken from so many nearest views; >= 1.
+  int surface_samples = 1000;             // Points of the learned surface that are drawn to the depth image; 0 = none.
+  int surface_views = 3;                  // ...taken from so many nearest views; >= 1.
   double roi_margin = 0.25;  // Interest points are sought this share of the object's size around where it is expected; >= 0.
 
   void Check() const;  // Throws std::invalid_argument naming the field.

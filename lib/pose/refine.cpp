@@ -1,6 +1,7 @@
 #include "pose/refine.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -87,6 +88,22 @@ void AddSurface(const SurfacePoint& sample, const rgbd::Frame& frame, const geom
   equations->Add(jacobian * inverse_sigma, error, kSampleWeight * Cauchy(error * error, 2.0));
 }
 
+void AddPrior(const PosePrior& prior, const geometry::Rigid& T, NormalEquations* equations) {
+  const Eigen::Vector3d translation = T.translation() - prior.T_camera_object.translation();
+  const Eigen::AngleAxisd turn(T.linear() * prior.T_camera_object.linear().transpose());
+  const Eigen::Vector3d rotation = turn.angle() * turn.axis();
+  const Eigen::Matrix3d lever = -Cross(T.translation());
+  for (int axis = 0; axis < 3; ++axis) {
+    Vector6d jacobian = Vector6d::Zero();
+    jacobian(axis) = 1.0;
+    jacobian.tail<3>() = lever.row(axis).transpose();
+    equations->Add(jacobian / prior.sigma_m, translation(axis) / prior.sigma_m, 1.0);
+    jacobian.setZero();
+    jacobian(3 + axis) = 1.0;
+    equations->Add(jacobian / prior.sigma_rad, rotation(axis) / prior.sigma_rad, 1.0);
+  }
+}
+
 // `add` puts all residuals at a pose into the equations.
 template <typename AddAll>
 geometry::Rigid GaussNewton(const geometry::Rigid& start, int iterations, const AddAll& add) {
@@ -121,10 +138,18 @@ geometry::Rigid RefinePose(const std::vector<Match2d3d>& matches, const std::vec
 
 geometry::Rigid RefinePoseOnSurface(const std::vector<Match2d3d>& matches, const std::vector<int>& index,
                                     const std::vector<SurfacePoint>& surface, const rgbd::Frame& frame,
-                                    const geometry::Rigid& T_camera_object, double scale_px, int iterations) {
+                                    const std::optional<PosePrior>& prior, const geometry::Rigid& T_camera_object, double scale_px,
+                                    int iterations) {
+  // Matches err together (their model points were lifted from few depth images), and beside a prior that counts: they weigh at most
+  // as much as so many independent ones.
+  constexpr double kIndependentMatches = 8.0;
+  const double weight = prior ? std::min(1.0, kIndependentMatches / std::max<double>(1.0, index.size())) : 1.0;
   return GaussNewton(T_camera_object, iterations, [&](const geometry::Rigid& T, NormalEquations* equations) {
     for (const int i : index) AddMatch(matches[i], frame.camera, T, scale_px, equations);
+    equations->hessian *= weight;
+    equations->gradient *= weight;
     for (const SurfacePoint& sample : surface) AddSurface(sample, frame, T, equations);
+    if (prior) AddPrior(*prior, T, equations);
   });
 }
 

@@ -1,6 +1,7 @@
 // Non-linear refinement of one camera pose on 2D-3D matches.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "geometry/camera.h"
@@ -25,10 +26,19 @@ struct SurfacePoint {
   Eigen::Vector3d normal;
 };
 
+// Where something else (a mount) says the object is, and how well it knows: standard deviations of the object's origin and of its
+// axes.
+struct PosePrior {
+  geometry::Rigid T_camera_object = geometry::Rigid::Identity();
+  double sigma_m = 0.005;
+  double sigma_rad = 0.01;
+};
+
 // As above, and the surface is drawn to the frame's depth image (point to plane, projective association; samples further than 2 cm
-// from it do not count). The start must be within a centimetre or so.
+// from it do not count), the pose to the prior. The start must be within a centimetre or so.
 geometry::Rigid RefinePoseOnSurface(const std::vector<Match2d3d>& matches, const std::vector<int>& index,
                                     const std::vector<SurfacePoint>& surface, const rgbd::Frame& frame,
-                                    const geometry::Rigid& T_camera_object, double scale_px, int iterations = 10);
+                                    const std::optional<PosePrior>& prior, const geometry::Rigid& T_camera_object, double scale_px,
+                                    int iterations = 10);
 
 }  // namespace vantage::pose

@@ -1,5 +1,8 @@
 #include "session/judge.h"
 
+#include <numeric>
+#include <opencv2/core/utility.hpp>
+
 namespace vantage::session {
 namespace {
 
@@ -33,16 +36,21 @@ double Judge::TrueDetectionRate(std::shared_ptr<const model::ObjectModel> object
   if (views_.empty()) return 0.0;
   recognition::Recogniser recogniser(recogniser_params_);
   recogniser.Set(object);
-  int right = 0;
-  for (const JudgeView& view : views_) {
-    for (const recognition::Detection& detection : recogniser.Recognise(view.frame, view.features)) {
-      if (detection.probability < kDetected) continue;
-      const geometry::Rigid T_camera_mesh = detection.T_camera_object * T_mesh_object.inverse();
-      right += model::MeanPointDistance(points_in_mesh_, T_camera_mesh, view.T_camera_mesh) < kCorrect;
-      break;
-    }
+  std::vector<int> right(views_.size(), 0);
+  cv::parallel_for_(cv::Range(0, size()), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) right[i] = IsDetected(recogniser, views_[i], T_mesh_object);
+  });
+  return std::accumulate(right.begin(), right.end(), 0.0) / size();
+}
+
+bool Judge::IsDetected(const recognition::Recogniser& recogniser, const JudgeView& view,
+                       const geometry::Rigid& T_mesh_object) const {
+  for (const recognition::Detection& detection : recogniser.Recognise(view.frame, view.features)) {
+    if (detection.probability < kDetected) continue;
+    const geometry::Rigid T_camera_mesh = detection.T_camera_object * T_mesh_object.inverse();
+    return model::MeanPointDistance(points_in_mesh_, T_camera_mesh, view.T_camera_mesh) < kCorrect;
   }
-  return double(right) / views_.size();
+  return false;
 }
 
 }  // namespace vantage::session

@@ -33,6 +33,8 @@ class Judge {
   double TrueDetectionRate(std::shared_ptr<const model::ObjectModel> object, const geometry::Rigid& T_mesh_object) const;
 
  private:
+  bool IsDetected(const recognition::Recogniser& recogniser, const JudgeView& view, const geometry::Rigid& T_mesh_object) const;
+
   recognition::RecogniserParams recogniser_params_;
   Eigen::Matrix3Xd points_in_mesh_;
   std::vector<JudgeView> views_;

@@ -83,6 +83,8 @@ void Fields(Visitor& visit, learning::LearnerParams& params) {
   visit("min_view_angle_deg", params.min_view_angle_deg);
   visit("max_mount_translation_m", params.max_mount_translation_m);
   visit("max_mount_rotation_deg", params.max_mount_rotation_deg);
+  visit("mount_sigma_m", params.mount_sigma_m);
+  visit("mount_sigma_deg", params.mount_sigma_deg);
   visit("agreement_prior", params.agreement_prior);
   visit("require_mount_agreement", params.require_mount_agreement);
   visit("surface_samples", params.surface_samples);
