@@ -82,6 +82,7 @@ void PlannerNode::OnTrack(const track_t& message) {
   if (track->utime < look_.arrived_us + static_cast<std::int64_t>(params_.settle_s * 1e6)) return;
   ++look_.frames;
   look_.detected |= track->result.T_camera_object.has_value() && track->result.probability >= 0.5;
+  look_.view_coming |= track->result.view_added;
   look_.note = track->result.note;
 }
 
@@ -120,7 +121,11 @@ std::string PlannerNode::Missing() const {
   if (!scene_) return "the scene (LEARNER_SCENE)";
   if (views() == 0) return "the first view";
   if (measured_views_ == 0 && Patient()) return "measures of the first view (ASSESSOR_MEASURES)";
-  if (stop_considered_ == measured_views_ && Patient()) return "measures of all views, before it stops";
+  if (stop_considered_) {
+    const bool same = *stop_considered_ == measured_views_;
+    return same && ElapsedSince(stop_considered_us_) < params_.measures_wait_s ? "measures of all views, before it stops" : "";
+  }
+  if (views() - measured_views_ > params_.max_unmeasured_views && Patient()) return "measures of the newest views";
   return "";
 }
 
@@ -145,7 +150,7 @@ void PlannerNode::Step() {
         Wait(missing);
         const bool begun = status_.decision > 0;
         if (!begun && ElapsedSince(waiting_since_us_) > params_.wait_s) Finish("nothing_to_explore");
-        if (begun && ElapsedSince(first_decision_us_) > params_.planner.time_budget_s) {
+        if (begun && ElapsedSince(first_decision_us_) > BudgetS()) {
           Finish(exploration::ToString(exploration::StopReason::kTimeBudget));
         }
       }
@@ -180,7 +185,7 @@ void PlannerNode::ListCandidates() {
 // A stop is believed only with measures of all views: a fit of fewer is too modest, or too bold.
 bool PlannerNode::StopIsCertain(exploration::StopReason reason) const {
   if (reason == exploration::StopReason::kTimeBudget || reason == exploration::StopReason::kMaxAttempts) return true;
-  return measured_views_ >= views() || !Patient();
+  return measured_views_ >= views() || (stop_considered_ && ElapsedSince(stop_considered_us_) >= params_.measures_wait_s);
 }
 
 void PlannerNode::Plan() {
@@ -192,12 +197,14 @@ void PlannerNode::Plan() {
   for (const auto& candidate : candidates_) {
     if (mount->WhyUnreachable(candidate.T_world_camera).empty()) belief_.reachable.push_back({candidate.viewpoint, 1.0});
   }
+  if (ElapsedSince(first_decision_us_) > BudgetS()) return Finish(exploration::ToString(exploration::StopReason::kTimeBudget));
   decision_ = strategy_->Decide(belief_, candidates_, mount_state_->T_world_camera(), *mount, ElapsedSince(first_decision_us_));
   plan_s_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   total_plan_s_ += plan_s_;
   status_.completeness = decision_->completeness;
   if (decision_->chosen < 0) {
     if (!StopIsCertain(decision_->stop)) {
+      if (!stop_considered_) stop_considered_us_ = now_us();
       stop_considered_ = measured_views_;
       return;
     }
@@ -252,7 +259,7 @@ void PlannerNode::Move() {
 
 void PlannerNode::LookAround() {
   const bool learned = views() > views_at_departure_;
-  const bool seen_enough = look_.frames >= params_.look_frames || (learned && look_.frames >= 1);
+  const bool seen_enough = learned ? look_.frames >= 1 : look_.frames >= params_.look_frames && !look_.view_coming;
   if (seen_enough) return EndAttempt(true);
   if (ElapsedSince(look_.since_us) < params_.look_s) return;
   if (look_.frames > 0) return EndAttempt(true);

@@ -1,6 +1,7 @@
 // The planner: decides where to look next, sends the mount there, waits for what the learner makes of it, and knows when to stop.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +21,9 @@ struct PlannerNodeParams {
   std::uint32_t seed = 0;
   double wait_s = 90.0;           // Where there is still no object to explore after so long, the run ends; > 0.
   double measures_wait_s = 60.0;  // The first decision and a decision to stop wait at most so long for measures of all views; >= 0.
+  int max_unmeasured_views =
+      3;  // So many views may be without measures when a decision is made; more are waited for likewise; >= 0.
+  double time_limit_s = 420.0;    // The run ends after this time since the first decision, whatever the strategy's budget; > 0.
   double settle_s = 0.1;          // Frames captured less than this after arrival do not count; >= 0.
   int look_frames = 3;            // An attempt ends when the learner has looked at so many frames...
   double look_s = 6.0;            // ...or after this time; > 0.
@@ -67,6 +71,7 @@ class PlannerNode : public messaging::Node {
     std::int64_t since_us = 0;  // By our clock.
     int frames = 0;
     bool detected = false;
+    bool view_coming = false;  // The learner has a new view; LEARNER_VIEW says when it is durable.
     std::string note;
   };
 
@@ -93,6 +98,7 @@ class PlannerNode : public messaging::Node {
 
   bool Fresh(std::int64_t heard_us) const;
   double ElapsedSince(std::int64_t utime) const { return 1e-6 * static_cast<double>(now_us() - utime); }
+  double BudgetS() const { return std::min(params_.planner.time_budget_s, params_.time_limit_s); }
   int views() const { return static_cast<int>(belief_.views.size()); }
 
   PlannerNodeParams params_;
@@ -114,8 +120,9 @@ class PlannerNode : public messaging::Node {
   messaging::PlanStatus status_;
   std::string waiting_for_;
   std::int64_t waiting_since_us_ = 0;
-  std::int64_t progress_us_ = 0;        // When views or measures were last heard to have grown.
-  std::optional<int> stop_considered_;  // The measured views a decision to stop was made with.
+  std::int64_t progress_us_ = 0;         // When views or measures were last heard to have grown.
+  std::optional<int> stop_considered_;   // The measured views a decision to stop was made with...
+  std::int64_t stop_considered_us_ = 0;  // ...and when it was made first.
   std::int64_t first_decision_us_ = 0;
   motion::Obstacles obstacles_;
   std::vector<exploration::CandidateView> candidates_;

@@ -12,6 +12,8 @@ void PlannerNodeParams::Check() const {
   require(strategy == "planner" || strategy == "random", "strategy must be planner or random");
   require(wait_s > 0.0, "wait_s must be > 0");
   require(measures_wait_s >= 0.0, "measures_wait_s must be >= 0");
+  require(max_unmeasured_views >= 0, "max_unmeasured_views must be >= 0");
+  require(time_limit_s > 0.0, "time_limit_s must be > 0");
   require(settle_s >= 0.0, "settle_s must be >= 0");
   require(look_frames >= 1, "look_frames must be >= 1");
   require(look_s > 0.0, "look_s must be > 0");
@@ -40,6 +42,8 @@ PlannerNodeParams LoadPlannerNodeParams(const std::string& config_file, const st
   yaml.Get("seed", params.seed);
   yaml.Get("wait_s", params.wait_s);
   yaml.Get("measures_wait_s", params.measures_wait_s);
+  yaml.Get("max_unmeasured_views", params.max_unmeasured_views);
+  yaml.Get("time_limit_s", params.time_limit_s);
   yaml.Get("settle_s", params.settle_s);
   yaml.Get("look_frames", params.look_frames);
   yaml.Get("look_s", params.look_s);
