@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "pose/depth_noise.h"
+
 namespace vantage::pose {
 namespace {
 
@@ -38,9 +40,6 @@ struct NormalEquations {
   }
 };
 
-// Standard deviation of structured-light depth, metres.
-double DepthSigma(double depth_m) { return 0.0015 + 0.0025 * depth_m * depth_m; }
-
 double Cauchy(double squared, double scale) { return 1.0 / (1.0 + squared / (scale * scale)); }
 
 // A pixel of reprojection error weighs as much as a standard deviation of depth.
@@ -61,7 +60,7 @@ void AddMatch(const Match2d3d& match, const geometry::PinholeCamera& camera, con
   for (int axis = 0; axis < 2; ++axis) equations->Add(jacobian.row(axis).transpose(), residual(axis), weight);
   ++equations->matches;
   if (match.depth_m <= 0.0) return;
-  const double inverse_sigma = 1.0 / DepthSigma(match.depth_m);
+  const double inverse_sigma = 1.0 / DepthNoise{}.Sigma(match.depth_m);
   const double error = (p.z() - match.depth_m) * inverse_sigma;
   Vector6d depth_jacobian;
   depth_jacobian << 0, 0, 1, p.y(), -p.x(), 0;
@@ -81,7 +80,7 @@ void AddSurface(const SurfacePoint& sample, const rgbd::Frame& frame, const geom
   if (!measured) return;
   const double distance = normal.dot(p - *measured);
   if (std::abs(distance) > kMaxDistance) return;
-  const double inverse_sigma = 1.0 / DepthSigma(measured->z());
+  const double inverse_sigma = 1.0 / DepthNoise{}.Sigma(measured->z());
   Vector6d jacobian;
   jacobian << normal, p.cross(normal);
   const double error = distance * inverse_sigma;
