@@ -16,7 +16,7 @@ struct RansacParams {
   double inlier_px = 3.0;           // Reprojection error of an inlier; > 0.
   double failure_rate = 0.001;      // eta_0 of equation (8): stop when a correct pose was missed with less than this; (0, 1).
   int min_iterations = 50;          // >= 1.
-  int max_iterations = 3000;        // >= min_iterations.
+  int max_iterations = 10000;       // Of any cluster; 6905 find 10 % of inliers; >= min_iterations.
   double max_depth_error_m = 0.03;  // |dz| between an inlier's point and the depth image that still supports a pose; > 0.
   double min_depth_support = 0.5;   // Share of the sampled and inlying points with depth that must be supported; [0, 1].
 
@@ -37,7 +37,7 @@ struct PoseEstimate {
 };
 
 // nullopt where fewer than 4 matches or no pose with at least 4 inliers was found. `depth` may be null: no depth check.
-// The result is refined on its inliers. Cost: about 10 us an iteration at 200 matches.
+// The result is refined on its inliers. The case of one cluster of EstimatePoses (multi_ransac.h), with its cost.
 std::optional<PoseEstimate> EstimatePose(const std::vector<Match2d3d>& matches, const geometry::PinholeCamera& camera,
                                          const rgbd::Frame* depth, const RansacParams& params, std::uint32_t seed);
 
