@@ -3,34 +3,13 @@
 #include <stdexcept>
 
 #include "features/features.h"
+#include "features/inner_products.h"
 
 namespace vantage::features {
 namespace {
 
-constexpr int kLanes = 8;       // Floats a vector register holds: one per query row.
-constexpr int kQueryRows = 16;  // Query rows that share one pass over the train rows: two registers.
-constexpr int kTrainRows = 4;   // Train rows per step; 2 x 4 sums stay in registers.
-
-typedef float Lanes __attribute__((vector_size(kLanes * sizeof(float)), aligned(4)));
-
-// Inner products of 4 train rows with 16 query rows. `queries` is transposed: value i of all query rows, then value i + 1; so no
-// sum runs across a register. The compiler makes one version for AVX2 and one for any machine, and picks at run time.
-__attribute__((target_clones("arch=x86-64-v3", "default"))) void InnerProducts(const float* queries, const float* const* train,
-                                                                               int length, float* products) {
-  Lanes low[kTrainRows] = {}, high[kTrainRows] = {};
-  for (int i = 0; i < length; ++i) {
-    const Lanes q_low = *reinterpret_cast<const Lanes*>(queries + i * kQueryRows);
-    const Lanes q_high = *reinterpret_cast<const Lanes*>(queries + i * kQueryRows + kLanes);
-    for (int t = 0; t < kTrainRows; ++t) {
-      low[t] += q_low * train[t][i];
-      high[t] += q_high * train[t][i];
-    }
-  }
-  for (int t = 0; t < kTrainRows; ++t) {
-    *reinterpret_cast<Lanes*>(products + t * kQueryRows) = low[t];
-    *reinterpret_cast<Lanes*>(products + t * kQueryRows + kLanes) = high[t];
-  }
-}
+constexpr int kQueryRows = kProductColumns;  // Query rows that share one pass over the train rows.
+constexpr int kTrainRows = kProductRows;     // Train rows per step.
 
 struct BestTwo {
   int best = -1, second = -1;

@@ -14,12 +14,6 @@ constexpr int kPointNumbers = 6;
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the store's bytes are little-endian");
 
-std::uint64_t Checksum(const char* bytes, std::size_t count) {
-  std::uint64_t hash = 14695981039346656037ull;
-  for (std::size_t i = 0; i < count; ++i) hash = (hash ^ static_cast<unsigned char>(bytes[i])) * 1099511628211ull;
-  return hash;
-}
-
 template <typename Value>
 void Put(Blob& blob, Value value) {
   blob.append(reinterpret_cast<const char*>(&value), sizeof(value));
@@ -74,6 +68,11 @@ class Reader {
 };
 
 }  // namespace
+
+std::uint64_t Checksum(const char* bytes, std::size_t count, std::uint64_t hash) {
+  for (std::size_t i = 0; i < count; ++i) hash = (hash ^ static_cast<unsigned char>(bytes[i])) * 1099511628211ull;
+  return hash;
+}
 
 Blob EncodeImage(const cv::Mat& image) {
   if (image.empty()) return {};

@@ -1,6 +1,8 @@
 // How the store's columns hold images, features, points and poses: little-endian bytes, each with a checksum at its end.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -9,7 +11,10 @@
 
 namespace vantage::model {
 
-// Bytes followed by their 8-byte checksum (FNV-1a, 64 bit). Decoders throw std::runtime_error in a few words ("3 bytes are no
+// FNV-1a, 64 bit. `hash` is the checksum of the bytes before these, so that a stream can be summed up piece by piece.
+std::uint64_t Checksum(const char* bytes, std::size_t count, std::uint64_t hash = 14695981039346656037ull);
+
+// Bytes followed by their 8-byte checksum. Decoders throw std::runtime_error in a few words ("3 bytes are no
 // image") where a blob is short, damaged or not what its name says; callers add object and view.
 using Blob = std::string;
 

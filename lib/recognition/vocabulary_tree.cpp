@@ -1,0 +1,266 @@
+#include "recognition/vocabulary_tree.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <opencv2/core/utility.hpp>
+#include <stdexcept>
+
+#include "recognition/kmeans.h"
+
+namespace vantage::recognition {
+namespace {
+
+constexpr int kBlock = 16;                    // Centroids of a block (PaddedCount).
+constexpr int kChunkBlocks = 256;             // Blocks allocated at once: 1 MB for 64 values.
+constexpr int kMaxDepth = 32;                 // A leaf down there stays one: its descriptors are as good as alike.
+constexpr int kMinRowsPerChild = 2;           // Training makes no children for fewer rows each, on average.
+constexpr std::size_t kParallelRows = 20000;  // From so many rows on, threads share them.
+
+std::mt19937 RandomOf(std::uint32_t seed, int node) {
+  return std::mt19937(seed * 2654435761u ^ static_cast<std::uint32_t>(node) * 2246822519u);
+}
+
+void CheckRows(const cv::Mat& descriptors, int length) {
+  if (descriptors.rows == 0) return;
+  if (descriptors.type() != CV_32F || (length > 0 && descriptors.cols != length)) {
+    throw std::invalid_argument("vocabulary: descriptors must be CV_32F rows of " + std::to_string(length) + " values; found " +
+                                cv::typeToString(descriptors.type()) + " of " + std::to_string(descriptors.cols));
+  }
+}
+
+std::vector<const float*> RowPointers(const cv::Mat& descriptors) {
+  std::vector<const float*> rows(descriptors.rows);
+  for (int i = 0; i < descriptors.rows; ++i) rows[i] = descriptors.ptr<float>(i);
+  return rows;
+}
+
+// AssignToCentroids on all cores; every row's answer is its own, so threads change nothing.
+void AssignParallel(const float* packed, int count, int length, const float* const* rows, std::size_t row_count, int* nearest) {
+  if (row_count < kParallelRows) return AssignToCentroids(packed, count, length, rows, row_count, nearest);
+  const int pieces = static_cast<int>(row_count / (kParallelRows / 4));
+  cv::parallel_for_(cv::Range(0, pieces), [&](const cv::Range& range) {
+    const std::size_t begin = row_count * range.start / pieces, end = row_count * range.end / pieces;
+    AssignToCentroids(packed, count, length, rows + begin, end - begin, nearest + begin);
+  });
+}
+
+}  // namespace
+
+void VocabularyParams::Check() const {
+  const auto require = [](bool ok, const std::string& what) {
+    if (!ok) throw std::invalid_argument("vocabulary: " + what);
+  };
+  require(branching >= 2 && branching <= 256, "branching must be in [2, 256], is " + std::to_string(branching));
+  require(depth >= 1 && depth <= 12, "depth must be in [1, 12], is " + std::to_string(depth));
+  require(iterations >= 1, "iterations must be >= 1, is " + std::to_string(iterations));
+}
+
+VocabularyTree::VocabularyTree(const std::string& descriptor, int length, const VocabularyParams& params)
+    : descriptor_(descriptor), length_(length), params_(params) {
+  params.Check();
+  if (length < 1) throw std::invalid_argument("vocabulary: descriptors need at least one value");
+  Node root;
+  root.leaf = 0;
+  nodes_.push_back(root);
+  leaf_nodes_.push_back(0);
+}
+
+const float* VocabularyTree::Centroids(int block) const {
+  return chunks_[block / kChunkBlocks].ptr<float>(0) +
+         static_cast<std::size_t>(block % kChunkBlocks) * PackedFloats(kBlock, length_);
+}
+
+float* VocabularyTree::Centroids(int block) {
+  return const_cast<float*>(static_cast<const VocabularyTree*>(this)->Centroids(block));
+}
+
+int VocabularyTree::AddBlocks(int count) {
+  const int blocks = PaddedCount(count) / kBlock;
+  const int left = static_cast<int>(chunks_.size()) * kChunkBlocks - blocks_;
+  if (left < blocks) {
+    blocks_ += left;
+    const auto floats = static_cast<int>(kChunkBlocks * PackedFloats(kBlock, length_));
+    chunks_.emplace_back(1, floats, CV_32F);
+  }
+  const int first = blocks_;
+  blocks_ += blocks;
+  return first;
+}
+
+void VocabularyTree::AddChildren(int node, const float* centroids, int count) {
+  Node& parent = nodes_[node];
+  parent.block = AddBlocks(count);
+  PackCentroids(centroids, count, length_, Centroids(parent.block));
+  parent.first_child = nodes();
+  parent.children = count;
+  for (int c = 0; c < count; ++c) {
+    Node child;
+    child.depth = nodes_[node].depth + 1;
+    child.leaf = c == 0 ? nodes_[node].leaf : leaves();
+    if (c == 0) {
+      leaf_nodes_[child.leaf] = nodes();
+    } else {
+      leaf_nodes_.push_back(nodes());
+    }
+    nodes_.push_back(child);
+  }
+  nodes_[node].leaf = -1;
+}
+
+std::vector<float> VocabularyTree::Divide(int node, const float* const* rows, std::size_t row_count) const {
+  std::mt19937 random = RandomOf(params_.seed, node);
+  KMeansParams params;
+  params.clusters = params_.branching;
+  params.iterations = params_.iterations;
+  return KMeans(rows, row_count, length_, params, random);
+}
+
+VocabularyTree VocabularyTree::Train(const std::string& descriptor, const cv::Mat& descriptors, const VocabularyParams& params,
+                                     const std::function<void(double)>& progress) {
+  if (descriptors.rows == 0) throw std::invalid_argument("vocabulary: no descriptors to train with");
+  VocabularyTree tree(descriptor, descriptors.cols, params);
+  CheckRows(descriptors, descriptors.cols);
+  std::vector<const float*> rows = RowPointers(descriptors), sorted(rows.size());
+  std::vector<int> nearest(rows.size());
+  struct Part {
+    int node;
+    std::size_t begin, end;  // Of rows.
+  };
+  std::deque<Part> parts = {{0, 0, rows.size()}};
+  double done = 0.0;
+  const double all = static_cast<double>(rows.size()) * params.depth;
+  for (; !parts.empty(); parts.pop_front()) {
+    const Part part = parts.front();
+    const std::size_t count = part.end - part.begin;
+    const int depth = tree.nodes_[part.node].depth;
+    std::vector<float> centroids;
+    if (depth < params.depth && count >= static_cast<std::size_t>(kMinRowsPerChild) * params.branching) {
+      centroids = tree.Divide(part.node, rows.data() + part.begin, count);
+    }
+    const int children = static_cast<int>(centroids.size() / tree.length_);
+    done += static_cast<double>(count) * (children < 2 ? params.depth - depth : 1);
+    if (progress) progress(std::min(1.0, done / all));
+    if (children < 2) continue;
+    tree.AddChildren(part.node, centroids.data(), children);
+    const Node& parent = tree.nodes_[part.node];
+    AssignParallel(tree.Centroids(parent.block), children, tree.length_, rows.data() + part.begin, count, nearest.data());
+    std::vector<std::size_t> begin(children + 1, part.begin);
+    for (std::size_t i = 0; i < count; ++i) ++begin[nearest[i] + 1];
+    for (int c = 0; c < children; ++c) begin[c + 1] += begin[c] - part.begin;
+    for (int c = 0; c < children; ++c) parts.push_back({parent.first_child + c, begin[c], begin[c + 1]});
+    for (std::size_t i = 0; i < count; ++i) sorted[begin[nearest[i]]++] = rows[part.begin + i];
+    std::copy(sorted.begin() + part.begin, sorted.begin() + part.end, rows.begin() + part.begin);
+  }
+  return tree;
+}
+
+std::size_t VocabularyTree::memory_bytes() const {
+  return nodes_.size() * sizeof(Node) + leaf_nodes_.size() * sizeof(std::int32_t) +
+         chunks_.size() * kChunkBlocks * PackedFloats(kBlock, length_) * sizeof(float);
+}
+
+namespace {
+
+// A node that a row has come to. Nearer is less; ties by number, so that the order of work is of no matter.
+struct Reached {
+  float excess;
+  int node;
+  bool operator<(const Reached& other) const { return excess != other.excess ? excess < other.excess : node < other.node; }
+};
+
+// The best few nodes of every row, best first.
+class Beams {
+ public:
+  Beams(int rows, int paths) : paths_(paths), reached_(static_cast<std::size_t>(rows) * paths), counts_(rows, 0) {}
+
+  int count(int row) const { return counts_[row]; }
+  const Reached& at(int row, int i) const { return reached_[static_cast<std::size_t>(row) * paths_ + i]; }
+
+  void Offer(int row, const Reached& candidate) {
+    Reached* best = reached_.data() + static_cast<std::size_t>(row) * paths_;
+    int& count = counts_[row];
+    if (count == paths_ && !(candidate < best[count - 1])) return;
+    int at = count < paths_ ? count++ : count - 1;
+    for (; at > 0 && candidate < best[at - 1]; --at) best[at] = best[at - 1];
+    best[at] = candidate;
+  }
+
+ private:
+  int paths_;
+  std::vector<Reached> reached_;
+  std::vector<int> counts_;
+};
+
+struct Visit {
+  int node;
+  int row;
+};
+
+}  // namespace
+
+Words VocabularyTree::Quantise(const cv::Mat& descriptors, int paths) const {
+  CheckRows(descriptors, length_);
+  if (paths < 1) throw std::invalid_argument("vocabulary: paths must be >= 1, is " + std::to_string(paths));
+  const int row_count = descriptors.rows;
+  const std::vector<const float*> rows = RowPointers(descriptors);
+  Beams beams(row_count, paths);
+  for (int row = 0; row < row_count; ++row) beams.Offer(row, {0.f, 0});
+  std::vector<float> excess(static_cast<std::size_t>(kComparedRows) * PaddedCount(params_.branching));
+  std::vector<Visit> visits;
+  while (true) {  // One level at a time, so that rows at the same node share a pass over its centroids.
+    visits.clear();
+    Beams next(row_count, paths);
+    for (int row = 0; row < row_count; ++row) {
+      for (int i = 0; i < beams.count(row); ++i) {
+        const Reached& reached = beams.at(row, i);
+        if (nodes_[reached.node].children > 0) {
+          visits.push_back({reached.node, row});
+        } else {
+          next.Offer(row, reached);
+        }
+      }
+    }
+    if (visits.empty()) break;
+    std::stable_sort(visits.begin(), visits.end(), [](const Visit& a, const Visit& b) { return a.node < b.node; });
+    for (std::size_t start = 0, end = 0; start < visits.size(); start = end) {
+      const Node& node = nodes_[visits[start].node];
+      const float* four[kComparedRows];
+      for (; end < visits.size() && end < start + kComparedRows && visits[end].node == visits[start].node; ++end) {
+        four[end - start] = rows[visits[end].row];
+      }
+      CompareWithCentroids(Centroids(node.block), node.children, length_, four, static_cast<int>(end - start), excess.data());
+      for (std::size_t v = start; v < end; ++v) {
+        const float* values = excess.data() + (v - start) * PaddedCount(node.children);
+        for (int c = 0; c < node.children; ++c) next.Offer(visits[v].row, {values[c], node.first_child + c});
+      }
+    }
+    beams = std::move(next);
+  }
+  Words words;
+  words.paths = paths;
+  words.leaves.assign(static_cast<std::size_t>(row_count) * paths, -1);
+  for (int row = 0; row < row_count; ++row) {
+    for (int i = 0; i < beams.count(row); ++i) {
+      words.leaves[static_cast<std::size_t>(row) * paths + i] = nodes_[beams.at(row, i).node].leaf;
+    }
+  }
+  return words;
+}
+
+std::vector<int> VocabularyTree::Split(int leaf, const cv::Mat& descriptors) {
+  CheckRows(descriptors, length_);
+  const int node = leaf_nodes_.at(leaf);
+  if (nodes_[node].depth >= kMaxDepth) return {};
+  const std::vector<const float*> rows = RowPointers(descriptors);
+  const std::vector<float> centroids = Divide(node, rows.data(), rows.size());
+  const int children = static_cast<int>(centroids.size() / length_);
+  if (children < 2) return {};
+  AddChildren(node, centroids.data(), children);
+  std::vector<int> parts(rows.size());
+  AssignToCentroids(Centroids(nodes_[node].block), children, length_, rows.data(), rows.size(), parts.data());
+  for (int& part : parts) part = nodes_[nodes_[node].first_child + part].leaf;
+  return parts;
+}
+
+}  // namespace vantage::recognition
