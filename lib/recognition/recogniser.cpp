@@ -2,90 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <stdexcept>
 
 #include "recognition/guided.h"
+#include "recognition/matching.h"
 #include "recognition/voting.h"
 
 namespace vantage::recognition {
-namespace {
-
-constexpr double kGroupRadius = 0.008;  // Model points this near (metres) are one place on the object to the ratio test.
-
-// Numbers the places: points nearer than kGroupRadius to a place's first point belong to it.
-std::vector<int> GroupPoints(const std::vector<model::ModelPoint>& points) {
-  std::map<std::array<int, 3>, std::vector<int>> cells;
-  std::vector<int> group(points.size());
-  const auto cell_of = [](const Eigen::Vector3d& p, int axis) { return static_cast<int>(std::floor(p[axis] / kGroupRadius)); };
-  for (size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d& p = points[i].position;
-    int found = -1;
-    for (int n = 0; n < 27 && found < 0; ++n) {
-      const auto cell = cells.find({cell_of(p, 0) + n % 3 - 1, cell_of(p, 1) + n / 3 % 3 - 1, cell_of(p, 2) + n / 9 - 1});
-      if (cell == cells.end()) continue;
-      for (const int leader : cell->second) {
-        if ((points[leader].position - p).norm() < kGroupRadius) found = leader;
-      }
-    }
-    if (found < 0) {
-      found = static_cast<int>(i);
-      cells[{cell_of(p, 0), cell_of(p, 1), cell_of(p, 2)}].push_back(found);
-    }
-    group[i] = found;
-  }
-  return group;
-}
-
-// One interest point of a stored view.
-struct Entry {
-  int view;
-  int keypoint;
-  int point;
-};
-
-// An object made ready for matching.
-struct Known {
-  std::shared_ptr<const model::ObjectModel> object;
-  cv::Mat descriptors;                        // Of all views, stacked.
-  std::vector<Entry> entries;                 // One per row.
-  std::vector<int> groups;                    // One per row.
-  std::vector<Eigen::Vector2d> centre_pixel;  // Of the object, per view.
-  std::vector<double> radius_px;              // Of the object, per view.
-};
-
-Known Prepare(std::shared_ptr<const model::ObjectModel> object) {
-  Known known;
-  known.object = object;
-  Eigen::Vector3d lower = Eigen::Vector3d::Constant(1e9), upper = -lower;
-  for (const model::ModelPoint& point : object->points) {
-    lower = lower.cwiseMin(point.position);
-    upper = upper.cwiseMax(point.position);
-  }
-  const Eigen::Vector3d centre = 0.5 * (lower + upper);
-  const double radius_m = std::max(0.01, 0.5 * (upper - lower).norm());
-  const std::vector<int> group = GroupPoints(object->points);
-  for (size_t v = 0; v < object->views.size(); ++v) {
-    const model::View& view = object->views[v];
-    const Eigen::Vector3d centre_in_camera = view.T_camera_object * centre;
-    known.centre_pixel.push_back(view.keyframe.camera.Project(centre_in_camera).value_or(Eigen::Vector2d::Zero()));
-    known.radius_px.push_back(view.keyframe.camera.fx * radius_m / std::max(0.05, centre_in_camera.z()));
-    for (int k = 0; k < view.features.size(); ++k) {
-      known.entries.push_back({static_cast<int>(v), k, view.points[k]});
-      known.groups.push_back(group[view.points[k]]);
-    }
-    known.descriptors.push_back(view.features.descriptors);
-  }
-  return known;
-}
-
-// A tentative match: a keypoint of the frame and a row of the object.
-struct Tentative {
-  int keypoint;
-  int row;
-};
-
-}  // namespace
 
 void RecogniserParams::Check() const {
   features.Check();
@@ -109,19 +32,10 @@ std::string RecogniserParams::Fingerprint() const {
 }
 
 struct Recogniser::Impl {
-  RecogniserParams params;
-  std::map<std::string, Known> objects;
+  explicit Impl(const RecogniserParams& all) : params(all), matcher(all.max_ratio) {}
 
-  std::vector<Tentative> Match(const Known& known, const features::Features& features) const {
-    std::vector<Tentative> matches;
-    const auto nearest = features::NearestTwo(features.descriptors, known.descriptors, known.groups);
-    for (size_t i = 0; i < nearest.size(); ++i) {
-      if (nearest[i].best >= 0 && nearest[i].best_distance < params.max_ratio * nearest[i].second_distance) {
-        matches.push_back({static_cast<int>(i), nearest[i].best});
-      }
-    }
-    return matches;
-  }
+  RecogniserParams params;
+  Matcher matcher;
 
   std::vector<VoteCluster> Vote(const Known& known, const features::Features& features,
                                 const std::vector<Tentative>& matches) const {
@@ -163,8 +77,7 @@ struct Recogniser::Impl {
   }
 
   std::optional<Detection> Find(const Known& known, const rgbd::Frame& frame, const features::Features& features,
-                                const model::KeypointGrid& grid) const {
-    const std::vector<Tentative> matches = Match(known, features);
+                                const model::KeypointGrid& grid, const std::vector<Tentative>& matches) const {
     std::optional<Detection> best;
     for (const VoteCluster& cluster : Vote(known, features, matches)) {
       std::vector<pose::Match2d3d> points;
@@ -182,9 +95,9 @@ struct Recogniser::Impl {
   }
 };
 
-Recogniser::Recogniser(const RecogniserParams& params) : params_(params), impl_(std::make_unique<Impl>()) {
+Recogniser::Recogniser(const RecogniserParams& params) : params_(params) {
   params.Check();
-  impl_->params = params;
+  impl_ = std::make_unique<Impl>(params);
 }
 Recogniser::~Recogniser() = default;
 Recogniser::Recogniser(Recogniser&&) noexcept = default;
@@ -196,12 +109,12 @@ void Recogniser::Set(std::shared_ptr<const model::ObjectModel> object) {
                                 ", the recogniser uses " + params_.features.Fingerprint() +
                                 "; learn it again or change the features");
   }
-  impl_->objects[object->name] = Prepare(object);
+  impl_->matcher.Set(object);
 }
 
-void Recogniser::Remove(const std::string& name) { impl_->objects.erase(name); }
+void Recogniser::Remove(const std::string& name) { impl_->matcher.Remove(name); }
 
-int Recogniser::size() const { return static_cast<int>(impl_->objects.size()); }
+int Recogniser::size() const { return impl_->matcher.size(); }
 
 features::Features Recogniser::Extract(const rgbd::Frame& frame) const {
   return features::Extract(rgbd::Gray(frame), cv::Mat(), params_.features);
@@ -213,12 +126,13 @@ std::vector<Detection> Recogniser::Recognise(const rgbd::Frame& frame, const fea
   if (!params_.use_query_depth) query.depth = cv::Mat();
   const model::KeypointGrid grid(features.keypoints, frame.camera.width, frame.camera.height);
   std::vector<Detection> detections;
-  for (const auto& [name, known] : impl_->objects) {
-    auto detection = impl_->Find(known, query, features, grid);
+  for (const ObjectMatches& candidate : impl_->matcher.Match(features)) {
+    const Known& known = *candidate.known;
+    auto detection = impl_->Find(known, query, features, grid, candidate.matches);
     if (!detection) continue;
     double prior = 0.5;
     for (const auto& [object, value] : priors) {
-      if (object == name) prior = value;
+      if (object == known.object->name) prior = value;
     }
     detection->probability = known.object->measures.observed.Probability(detection->confidence.value, prior);
     detection->source = known.object->measures.observed.source();
