@@ -35,10 +35,14 @@ struct RefinementReport {
 model::ObjectModel Refined(const model::ObjectModel& object, int first_free_view, const RefinementParams& params,
                            RefinementReport* report = nullptr, const std::vector<std::optional<pose::PosePrior>>& priors = {});
 
-// What a change did to object coordinates as seen from a pose: maps points of `base` to where `changed` (made from it) puts them,
-// by the view of both (same id) that is nearest in direction. A pose in base becomes T_camera_object * T_changed_base.inverse().
-geometry::Rigid ChangeNear(const model::ObjectModel& base, const model::ObjectModel& changed,
-                           const geometry::Rigid& T_camera_object);
+// The last step of it alone: keypoints of views from `first_free_view` on that are more than max_link_error_sigmas off.
+model::ObjectModel WithoutWrongLinks(const model::ObjectModel& object, int first_free_view, const RefinementParams& params,
+                                     int* unlinked = nullptr);
+
+// What a change did to object coordinates as this view has them: maps points of `before` to where `after` (made from it by any
+// functions of this folder) puts them. Where the view is gone, by the one that shares most points with it. A pose tracked against
+// the view becomes T_camera_object * ChangeOf(...).inverse(). Throws std::invalid_argument where before has no view of this id.
+geometry::Rigid ChangeOf(const model::ObjectModel& before, const model::ObjectModel& after, int view_id);
 
 // The change from `base` to `changed` (refined, linked, thinned out: by any functions of this folder) applied to `current`, which
 // is base with more views and points appended since. Views since then, and points only they see, move rigidly with the nearest

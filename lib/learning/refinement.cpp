@@ -1,0 +1,233 @@
+#include "learning/refinement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+
+#include "learning/model_edit.h"
+
+namespace vantage::learning {
+namespace {
+
+// How many views see each point, and the first that does (-1 = none).
+struct Sightings {
+  std::vector<int> views;
+  std::vector<int> first;
+
+  explicit Sightings(const model::ObjectModel& object) : views(object.points.size(), 0), first(object.points.size(), -1) {
+    std::vector<int> last(object.points.size(), -1);
+    for (int v = 0; v < static_cast<int>(object.views.size()); ++v) {
+      for (const int point : object.views[v].points) {
+        if (last[point] == v) continue;  // Two keypoints of one view.
+        last[point] = v;
+        ++views[point];
+        if (first[point] < 0) first[point] = v;
+      }
+    }
+  }
+};
+
+pose::BundleProblem ProblemOf(const model::ObjectModel& object, const Sightings& sightings, int first_free_view,
+                              const std::vector<std::optional<pose::PosePrior>>& priors) {
+  pose::BundleProblem problem;
+  for (int v = 0; v < static_cast<int>(object.views.size()); ++v) {
+    const model::View& view = object.views[v];
+    problem.views.push_back({view.T_camera_object, view.keyframe.camera, v < first_free_view,
+                             priors.empty() ? std::optional<pose::PosePrior>() : priors[v]});
+  }
+  // Only what a free view sees can move; depth is looked up for nothing else.
+  std::vector<bool> in_play(object.points.size(), false);
+  for (size_t v = first_free_view; v < object.views.size(); ++v) {
+    for (const int point : object.views[v].points) in_play[point] = sightings.views[point] >= 2;
+  }
+  for (const model::ModelPoint& point : object.points) problem.points.push_back(point.position);
+  for (int v = 0; v < static_cast<int>(object.views.size()); ++v) {
+    const model::View& view = object.views[v];
+    for (size_t k = 0; k < view.points.size(); ++k) {
+      if (!in_play[view.points[k]]) continue;
+      const Eigen::Vector2d pixel = PixelOf(view, static_cast<int>(k));
+      problem.observations.push_back({v, view.points[k], pixel, rgbd::DepthAt(view.keyframe, pixel).value_or(0.0)});
+    }
+  }
+  return problem;
+}
+
+// Maps object coordinates as view `before` had them to those of `after`.
+geometry::Rigid Change(const model::View& before, const model::View& after) {
+  return after.T_camera_object.inverse() * before.T_camera_object;
+}
+
+void MoveBy(const geometry::Rigid& T, model::ModelPoint* point) {
+  point->position = T * point->position;
+  point->normal = T.linear() * point->normal;
+}
+
+// --- Rebased ---
+
+int IndexOfView(const model::ObjectModel& object, int id) {
+  const auto found = std::lower_bound(object.views.begin(), object.views.end(), id,
+                                      [](const model::View& view, int wanted) { return view.id < wanted; });
+  return found != object.views.end() && found->id == id ? static_cast<int>(found - object.views.begin()) : -1;
+}
+
+// The first `count` views but this one, the nearest of kin first: those that share most points with it (they were placed by each
+// other, while direction misleads where drift is being taken out), then the nearest in direction.
+std::vector<int> ByKinship(const model::ObjectModel& object, int view, int count) {
+  const std::set<int> own(object.views[view].points.begin(), object.views[view].points.end());
+  std::vector<std::tuple<int, double, int>> order;
+  for (int other = 0; other < count; ++other) {
+    if (other == view) continue;
+    const std::vector<int>& points = object.views[other].points;
+    const auto shared = std::count_if(points.begin(), points.end(), [&](int point) { return own.count(point) > 0; });
+    const double angle =
+        geometry::AngleBetween(object.views[view].viewpoint().direction, object.views[other].viewpoint().direction);
+    order.emplace_back(-static_cast<int>(shared), angle, other);
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<int> views;
+  for (const auto& [shared, angle, other] : order) views.push_back(other);
+  return views;
+}
+
+void RequireAppended(const model::ObjectModel& base, const model::ObjectModel& current) {
+  bool same = current.views.size() >= base.views.size() && current.points.size() >= base.points.size();
+  for (size_t v = 0; same && v < base.views.size(); ++v) {
+    same = base.views[v].id == current.views[v].id && base.views[v].points == current.views[v].points;
+  }
+  if (!same) throw std::invalid_argument("rebased: expected the base model with views appended, found another");
+}
+
+// Where each point of base went, by the keypoints that are in both (whose pixels, sizes and order do not change).
+std::vector<int> PointsGoneTo(const model::ObjectModel& base, const model::ObjectModel& changed) {
+  std::vector<int> gone_to(base.points.size(), -1);
+  for (const model::View& view : changed.views) {
+    const int index = IndexOfView(base, view.id);
+    if (index < 0) continue;
+    const model::View& before = base.views[index];
+    int k = 0;
+    for (size_t now = 0; now < view.points.size(); ++now) {
+      const auto key = [](const cv::KeyPoint& p) { return std::tuple(p.pt.x, p.pt.y, p.size, p.angle, p.response); };
+      const auto wanted = key(view.features.keypoints[now]);
+      while (k < before.features.size() && key(before.features.keypoints[k]) != wanted) ++k;
+      if (k == before.features.size()) break;
+      int& target = gone_to[before.points[k++]];
+      if (target < 0) target = view.points[now];
+    }
+  }
+  return gone_to;
+}
+
+}  // namespace
+
+void RefinementParams::Check() const {
+  bundle.Check();
+  if (!(max_link_error_sigmas > 0.0)) throw std::invalid_argument("refinement: max_link_error_sigmas must be > 0");
+}
+
+model::ObjectModel Refined(const model::ObjectModel& object, int first_free_view, const RefinementParams& params,
+                           RefinementReport* report, const std::vector<std::optional<pose::PosePrior>>& priors) {
+  params.Check();
+  if (!priors.empty() && priors.size() != object.views.size())
+    throw std::invalid_argument("refinement: expected no prior or one per view, found " + std::to_string(priors.size()));
+  first_free_view = std::clamp(first_free_view, 1, std::max(1, static_cast<int>(object.views.size())));
+  RefinementReport own;
+  if (!report) report = &own;
+  *report = {};
+  const Sightings sightings(object);
+  pose::BundleProblem problem = ProblemOf(object, sightings, first_free_view, priors);
+  report->bundle = pose::AdjustBundle(&problem, params.bundle);
+
+  model::ObjectModel refined = object;
+  for (size_t v = 0; v < refined.views.size(); ++v) {
+    const geometry::PoseDifference moved = geometry::Difference(problem.views[v].T_camera_object, object.views[v].T_camera_object);
+    report->max_moved_m = std::max(report->max_moved_m, moved.translation_m);
+    report->max_turned_rad = std::max(report->max_turned_rad, moved.rotation_rad);
+    refined.views[v].T_camera_object = problem.views[v].T_camera_object;
+  }
+  for (size_t p = 0; p < refined.points.size(); ++p) {
+    const int v = sightings.first[p];
+    if (v >= first_free_view) MoveBy(Change(object.views[v], refined.views[v]), &refined.points[p]);
+    if (sightings.views[p] >= 2) refined.points[p].position = problem.points[p];
+  }
+  return WithoutWrongLinks(refined, first_free_view, params, &report->unlinked);
+}
+
+model::ObjectModel WithoutWrongLinks(const model::ObjectModel& object, int first_free_view, const RefinementParams& params,
+                                     int* unlinked) {
+  const Sightings sightings(object);
+  const double max_error_px = params.max_link_error_sigmas * params.bundle.pixel_sigma;
+  model::ObjectModel result = object;
+  int wrong = 0;
+  for (size_t v = first_free_view; v < result.views.size(); ++v) {
+    model::View& view = result.views[v];
+    const geometry::Rigid T_object_camera = view.T_camera_object.inverse();
+    std::vector<int> kept;
+    for (int k = 0; k < view.features.size(); ++k) {
+      const pose::Match2d3d match{PixelOf(view, k), result.points[view.points[k]].position, 0.0};
+      if (sightings.views[view.points[k]] >= 2 &&
+          !(pose::ReprojectionError(match, view.keyframe.camera, view.T_camera_object) <= max_error_px)) {
+        ++wrong;
+        const auto point = rgbd::PointAt(view.keyframe, match.pixel);
+        const auto normal = rgbd::NormalAt(view.keyframe, match.pixel);
+        if (!point || !normal) continue;
+        view.points[k] = static_cast<int>(result.points.size());
+        result.points.push_back({T_object_camera * *point, T_object_camera.linear() * *normal});
+      }
+      kept.push_back(k);
+    }
+    KeepKeypoints(kept, &view);
+  }
+  if (wrong > 0) DropUnusedPoints(&result);
+  if (unlinked) *unlinked = wrong;
+  return result;
+}
+
+geometry::Rigid ChangeOf(const model::ObjectModel& before, const model::ObjectModel& after, int view_id) {
+  const int index = IndexOfView(before, view_id);
+  if (index < 0) throw std::invalid_argument("change: no view with id " + std::to_string(view_id));
+  if (const int same = IndexOfView(after, view_id); same >= 0) return Change(before.views[index], after.views[same]);
+  const std::vector<int> partners = ByKinship(before, index, static_cast<int>(before.views.size()));
+  for (const int partner : partners) {
+    const int same = IndexOfView(after, before.views[partner].id);
+    if (same >= 0) return Change(before.views[partner], after.views[same]);
+  }
+  return geometry::Rigid::Identity();
+}
+
+model::ObjectModel Rebased(const model::ObjectModel& base, const model::ObjectModel& changed, const model::ObjectModel& current,
+                           std::vector<int>* new_index) {
+  RequireAppended(base, current);
+  model::ObjectModel result = changed;
+  result.name = current.name;
+  result.measures = current.measures;
+  std::vector<int> gone_to = PointsGoneTo(base, changed);
+  gone_to.resize(current.points.size(), -1);
+  for (size_t v = base.views.size(); v < current.views.size(); ++v) {
+    model::View view = current.views[v];
+    geometry::Rigid T_changed_base = geometry::Rigid::Identity();
+    for (const int partner : ByKinship(current, static_cast<int>(v), static_cast<int>(v))) {
+      const int same = IndexOfView(result, current.views[partner].id);
+      if (same < 0) continue;
+      T_changed_base = Change(current.views[partner], result.views[same]);
+      break;
+    }
+    for (int& point : view.points) {
+      if (gone_to[point] < 0) {
+        gone_to[point] = static_cast<int>(result.points.size());
+        result.points.push_back(current.points[point]);
+        MoveBy(T_changed_base, &result.points.back());
+      }
+      point = gone_to[point];
+    }
+    view.T_camera_object = view.T_camera_object * T_changed_base.inverse();
+    result.views.push_back(std::move(view));
+  }
+  if (new_index) *new_index = std::move(gone_to);
+  return result;
+}
+
+}  // namespace vantage::learning
