@@ -139,6 +139,7 @@ struct SimulatedWorld::Impl {
   WorldParams params;
   rendering::Scene scene;  // The objects first, in their order, then the furniture.
   std::vector<TrueObject> truth;
+  std::vector<std::shared_ptr<const Mesh>> meshes;  // Of the objects.
   NoiseTable noise;
 
   void Add(Mesh mesh, const Rigid& T_world_mesh) { scene.Add(std::make_shared<const Mesh>(std::move(mesh)), T_world_mesh); }
@@ -155,7 +156,8 @@ void SimulatedWorld::Impl::AddObject(const ObjectParams& object) {
   true_object.T_world_object = StandingPose(mesh, object.position_m, object.yaw_deg);
   true_object.points = rendering::SampleSurface(mesh, kTruthPoints, 1);
   truth.push_back(true_object);
-  Add(std::move(mesh), true_object.T_world_object);
+  meshes.push_back(std::make_shared<const Mesh>(std::move(mesh)));
+  scene.Add(meshes.back(), true_object.T_world_object);
 }
 
 void SimulatedWorld::Impl::AddTable() {
@@ -194,6 +196,10 @@ SimulatedWorld::SimulatedWorld(const WorldParams& params) : impl_(std::make_uniq
 SimulatedWorld::~SimulatedWorld() = default;
 
 rgbd::Frame SimulatedWorld::Look(const Rigid& T_world_camera, std::uint32_t seed) const {
+  return Look(T_world_camera, seed, Twist());
+}
+
+rgbd::Frame SimulatedWorld::Look(const Rigid& T_world_camera, std::uint32_t seed, const Twist& twist) const {
   const WorldParams& params = impl_->params;
   rendering::RenderParams how;
   how.samples_per_axis = params.render_samples_per_axis;
@@ -206,9 +212,22 @@ rgbd::Frame SimulatedWorld::Look(const Rigid& T_world_camera, std::uint32_t seed
   frame.T_world_camera = T_world_camera;
   frame.depth = MeasuredDepth(image, params.sensor, impl_->noise.StreamOf(stream));
   frame.color = image.color;
+  if (params.sensor.motion_blur) BlurByMotion(image.depth, frame.camera, twist, params.sensor.exposure_s, &frame.color);
   AddImageNoise(params.sensor.image_noise, impl_->noise.StreamOf(~stream), &frame.color);
   return frame;
 }
+
+void SimulatedWorld::MoveObject(int object, const Rigid& T_world_object) {
+  impl_->truth.at(object).T_world_object = T_world_object;
+  impl_->scene.Move(object, T_world_object);
+}
+
+void SimulatedWorld::ShowObject(int object, bool visible) {
+  static_cast<void>(impl_->truth.at(object));
+  impl_->scene.SetVisible(object, visible);
+}
+
+const Mesh& SimulatedWorld::MeshOf(int object) const { return *impl_->meshes.at(object); }
 
 cv::Mat SimulatedWorld::Labels(const Rigid& T_world_camera) const {
   rendering::RenderParams how;

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "rendering/scene.h"
+#include "simulation/motion_blur.h"
 #include "simulation/world.h"
 
 namespace vantage::simulation {
@@ -20,6 +21,8 @@ struct SensorParams {
   double min_depth_m = 0.3;
   double max_depth_m = 4.0;
   double image_noise = 2.0;  // Sigma, grey levels.
+  bool motion_blur = true;   // Where the camera's motion is told; see Look.
+  double exposure_s = 0.015;
 
   void Check() const;  // Throws std::invalid_argument naming the field.
 };
@@ -77,6 +80,14 @@ class SimulatedWorld : public World {
   // utime and id are left 0 for the caller to fill in. About 60 ms at 640 x 480 on one core.
   rgbd::Frame Look(const geometry::Rigid& T_world_camera, std::uint32_t seed) const override;
   std::vector<geometry::Rigid> Viewpoints() const override { return {}; }
+  // ...by a camera that moves while the shutter is open (sensor.motion_blur, exposure_s).
+  rgbd::Frame Look(const geometry::Rigid& T_world_camera, std::uint32_t seed, const Twist& twist) const;
+
+  // Things happen in the world. `object` is an index into params.objects. Not while another thread looks.
+  void MoveObject(int object, const geometry::Rigid& T_world_object);
+  void ShowObject(int object, bool visible);  // Hidden ones are in Truth() all the same.
+  const rendering::Mesh& MeshOf(int object) const;
+
   geometry::Rigid StartPose() const override;
   geometry::PinholeCamera Camera() const override;
   motion::Obstacles Furniture() const override;

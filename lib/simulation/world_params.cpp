@@ -29,6 +29,8 @@ SensorParams ReadSensor(config::Mapping yaml) {
   yaml.Get("min_depth_m", sensor.min_depth_m);
   yaml.Get("max_depth_m", sensor.max_depth_m);
   yaml.Get("image_noise", sensor.image_noise);
+  yaml.Get("motion_blur", sensor.motion_blur);
+  yaml.Get("exposure_s", sensor.exposure_s);
   yaml.Finish();
   yaml.Check(sensor);
   return sensor;
@@ -70,6 +72,7 @@ void SensorParams::Check() const {
   Require(min_depth_m >= 0.0, "sensor.min_depth_m must be >= 0");
   Require(max_depth_m > min_depth_m && max_depth_m <= 65.0, "sensor.max_depth_m must be in (min_depth_m, 65]");
   Require(image_noise >= 0.0 && image_noise <= 64.0, "sensor.image_noise must be in [0, 64]");
+  Require(exposure_s >= 0.0 && exposure_s <= 1.0, "sensor.exposure_s must be in [0, 1]");
 }
 
 void ObjectParams::Check() const {

@@ -49,6 +49,7 @@ int main(int argc, char** argv) {
   vantage::cli::AddAssess(app, run);
   vantage::cli::AddExplore(app, run);
   vantage::cli::AddModels(app, run);
+  vantage::cli::AddEvaluate(app, run);
   if (const std::string word = UnknownVerb(app, argc, argv); !word.empty()) {
     return Fail("vantage", "there is no verb '" + word + "'; see vantage --help");
   }

@@ -32,6 +32,9 @@ void AddRecognise(CLI::App& app, Run& run);
 void AddAssess(CLI::App& app, Run& run);
 void AddExplore(CLI::App& app, Run& run);
 void AddModels(CLI::App& app, Run& run);
+void AddEvaluate(CLI::App& app, Run& run);
+// The parts of `evaluate`.
+void AddEvaluateLearner(CLI::App& evaluate, Run& run);
 
 // --seed, --json, --config and --version.
 void AddCommonOptions(CLI::App& verb, CommonOptions& options);

@@ -94,7 +94,7 @@ class Cli : public ::testing::Test {
 };
 
 TEST_F(Cli, HelpAndVersionOfEveryVerb) {
-  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "models list", "models show"}) {
+  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "evaluate learner", "models list", "models show"}) {
     SCOPED_TRACE(verb);
     const Outcome help = Run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
@@ -124,6 +124,10 @@ TEST_F(Cli, MisuseIsOneLine) {
   ExpectRefused("explore", "vantage explore", {"--sequence", "--world", "--mesh"});
   ExpectRefused("explore --sequence a", "vantage explore", {"--object-id"});
   ExpectRefused("explore --world w.yaml --strategy best", "vantage explore", {"best"});
+  ExpectRefused("evaluate", "vantage evaluate", {});
+  ExpectRefused("evaluate learner", "vantage evaluate learner", {"--mesh", "--world"});
+  ExpectRefused("evaluate learner --mesh gone", "vantage evaluate learner", {"gone", "textured.obj"});
+  ExpectRefused("evaluate learner --mesh gone --fault tired", "vantage evaluate learner", {"tired", "covered"});
   EXPECT_TRUE(Files().empty());
 }
 

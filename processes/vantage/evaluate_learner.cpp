@@ -1,0 +1,247 @@
+// vantage evaluate learner: the learner on simulated orbits with the Kinect error model.
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <iostream>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "simulation/orbit_sequence.h"
+#include "vantage/learner_trial.h"
+
+namespace vantage::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct LearnerOptions {
+  CommonOptions common;
+  std::string world;
+  std::vector<std::string> meshes;
+  std::string swapped_for;
+  std::string fault = "none";
+  int frames = 0;  // 0 = all of the orbit.
+  bool quick = false;
+  bool tell_poses = false;
+  std::string save;
+};
+
+constexpr int kPictureEvery = 90;
+constexpr int kReplacedEvery = 5;       // Frames of the end of a circle that are placed anew.
+constexpr double kEndOfCircle_s = 1.0;  // Before it closes.
+
+// "003_cracker_box", a folder with textured.obj, or a file.
+fs::path MeshFile(const std::string& name) {
+  std::vector<fs::path> candidates = {name, fs::path(name) / "textured.obj"};
+  if (const char* data = std::getenv("VANTAGE_DATA")) candidates.push_back(fs::path(data) / "meshes" / name / "textured.obj");
+  for (const fs::path& file : candidates) {
+    if (fs::is_regular_file(file)) return file;
+  }
+  throw std::runtime_error("--mesh " + name + ": neither a file nor a folder with textured.obj, nor in meshes/ of $VANTAGE_DATA");
+}
+
+simulation::SequenceParams SequenceOf(const LearnerOptions& options) {
+  simulation::SequenceParams params;
+  params.seed = params.orbit.seed = options.common.seed;
+  params.tell_camera_pose = options.tell_poses;
+  params.fault.fault = simulation::FaultFromString(options.fault);
+  if (options.quick) {
+    params.orbit.elevations_deg = {35.0};
+    params.rate_hz = 10.0;
+    params.fault.start_s = 3.0;
+  }
+  return params;
+}
+
+// One orbit around the world's first object.
+class OrbitRun {
+ public:
+  OrbitRun(const LearnerOptions& options, const learning::LearnerParams& params, const simulation::WorldParams& world,
+           std::optional<int> other)
+      : options_(options),
+        params_(SequenceOf(options)),
+        name_(world.objects.front().name),
+        world_(world),
+        sequence_(world_, params_, other),
+        trial_(params, name_),
+        folder_(options.save.empty() ? fs::path() : fs::path(options.save) / name_) {}
+
+  void Run() {
+    if (!folder_.empty()) fs::create_directories(folder_);
+    const int count = options_.frames > 0 ? std::min(options_.frames, sequence_.size()) : sequence_.size();
+    for (int i = 0; i < count; ++i) {
+      simulation::OrbitFrame orbit = sequence_.Frame(i);
+      const FrameTruth truth{orbit.T_camera_mesh, orbit.time_s, orbit.circle, orbit.faulty, orbit.usable};
+      learning::Target target;
+      if (orbit.T_camera_mesh && !trial_.learner().object()) target.pixel = MiddlePixel(*orbit.T_camera_mesh);
+      const TrialStep& step = trial_.Step(orbit.frame, truth, target);
+      if (!folder_.empty() && (i % kPictureEvery == 0 || step.wrong)) SavePicture(orbit, step);
+    }
+  }
+
+  Json Result() {
+    Json result;
+    result["object"] = name_;
+    result["fault"] = options_.fault;
+    result.update(FiguresOf(trial_));
+    result["points"] = PointFigures(trial_, rendering::SurfaceDistance(world_.MeshOf(0)));
+    result["loop_end"] = Json::array();
+    for (int circle = 0; circle < sequence_.path().circles(); ++circle) result["loop_end"].push_back(LoopEnd(circle));
+    if (!folder_.empty()) {
+      SaveTrial(trial_, name_ + ", fault: " + options_.fault, folder_);
+      WriteWhole(folder_ / "figures.json", result.dump(2) + "\n");
+    }
+    return result;
+  }
+
+ private:
+  // The last frames before a circle closes: as they were tracked, and as the model at the end places them.
+  Json LoopEnd(int circle) {
+    const double closes_s = sequence_.path().ClosesAt_s(circle);
+    std::vector<PoseError> before, after;
+    int tried = 0;
+    for (std::size_t i = 0; i < trial_.steps().size(); ++i) {
+      const TrialStep& step = trial_.steps()[i];
+      if (step.truth.time_s <= closes_s - kEndOfCircle_s || step.truth.time_s > closes_s) continue;
+      if (step.error) before.push_back(*step.error);
+      if (i % kReplacedEvery != 0 || !step.truth.usable) continue;
+      ++tried;
+      simulation::OrbitFrame orbit = sequence_.Frame(static_cast<int>(i));
+      orbit.frame.T_world_camera.reset();
+      if (const auto error = trial_.Replaced(orbit.frame, step.truth)) after.push_back(*error);
+    }
+    return {
+        {"as_tracked", ErrorFigures(before)}, {"by_final_model", ErrorFigures(after)}, {"tried", tried}, {"placed", after.size()}};
+  }
+
+  std::optional<Eigen::Vector2d> MiddlePixel(const geometry::Rigid& T_camera_mesh) const {
+    const Eigen::Matrix3Xd points = world_.Truth()[0].points;
+    return world_.Camera().Project(T_camera_mesh * Eigen::Vector3d(points.rowwise().mean()));
+  }
+
+  // Colour and depth side by side.
+  void SavePicture(const simulation::OrbitFrame& orbit, const TrialStep& step) const {
+    cv::Mat depth, picture;
+    if (orbit.frame.depth.empty()) {
+      depth = cv::Mat::zeros(orbit.frame.color.size(), CV_8UC3);
+    } else {
+      orbit.frame.depth.convertTo(depth, CV_8U, 0.1);  // 2.55 m is white.
+      cv::merge(std::vector<cv::Mat>{depth, depth, depth}, depth);
+    }
+    cv::hconcat(orbit.frame.color, depth, picture);
+    std::ostringstream name;
+    name << "frame_" << orbit.frame.id << (step.wrong ? "_wrong" : step.tracked ? "" : "_lost") << ".png";
+    cv::imwrite((folder_ / name.str()).string(), picture);
+  }
+
+  LearnerOptions options_;
+  simulation::SequenceParams params_;
+  std::string name_;
+  simulation::SimulatedWorld world_;
+  simulation::OrbitSequence sequence_;
+  LearnerTrial trial_;
+  fs::path folder_;
+};
+
+std::string SummaryOf(const Json& figures) {
+  std::ostringstream text;
+  const Json& tracking = figures["tracking"];
+  const Json& views = figures["views"];
+  text << figures["object"].get<std::string>() << ": tracked " << tracking["tracked"] << " of " << tracking["usable"]
+       << " usable frames (" << tracking["wrong"] << " wrong), error " << tracking["error"]["mm"]["median"] << " mm "
+       << tracking["error"]["deg"]["median"] << " deg (median), max " << tracking["error"]["mm"]["max"] << " mm\n  "
+       << views["count"] << " views (" << views["wrong"] << " wrong), error " << views["error"]["mm"]["median"] << " mm "
+       << views["error"]["deg"]["median"] << " deg, max " << views["error"]["mm"]["max"] << " mm " << views["error"]["deg"]["max"]
+       << " deg\n  ";
+  if (!figures["points"].is_null()) {
+    text << figures["points"]["count"] << " points, " << figures["points"]["surface_mm"]["median"] << " mm from the surface (p95 "
+         << figures["points"]["surface_mm"]["p95"] << ")\n  ";
+  }
+  for (const Json& end : figures["loop_end"]) {
+    text << "loop end: " << end["as_tracked"]["mm"]["median"] << " mm " << end["as_tracked"]["deg"]["median"] << " deg as tracked, "
+         << end["by_final_model"]["mm"]["median"] << " mm " << end["by_final_model"]["deg"]["median"] << " deg by the final model ("
+         << end["placed"] << " of " << end["tried"] << " placed)\n  ";
+  }
+  if (!figures["after_fault"].is_null()) {
+    text << "fault " << figures["fault"].get<std::string>() << ": tracked again after "
+         << figures["after_fault"]["tracked_again_after_s"] << " s, tracked wrongly in "
+         << figures["after_fault"]["tracked_wrongly"] << " frames of it\n  ";
+  }
+  text << figures["ms"]["median"] << " ms a frame (p95 " << figures["ms"]["p95"] << "), of the processor "
+       << figures["cpu_ms"]["median"] << " (p95 " << figures["cpu_ms"]["p95"] << "); memory " << figures["memory_mb"]["first"]
+       << " -> " << figures["memory_mb"]["last"] << " MB\n";
+  return text.str();
+}
+
+// The world for one mesh; where it is swapped for another, that one is the last object.
+simulation::WorldParams WorldFor(const simulation::WorldParams& base, const std::vector<fs::path>& meshes) {
+  return meshes.empty() ? base : simulation::WorldWithMeshes(base, meshes);
+}
+
+void RunEvaluateLearner(const LearnerOptions& options) {
+  CheckOutput(options.common);
+  if (options.meshes.empty() && options.world.empty())
+    throw std::runtime_error("say what to learn: --mesh, or --world FILE for its first object");
+  cv::setNumThreads(1);
+  const params::LibraryParams params = LoadParams(options.common);
+  const simulation::WorldParams base =
+      options.world.empty() ? simulation::WorldParams() : simulation::LoadWorldParams(options.world);
+  const bool swapped = options.fault == simulation::ToString(simulation::Fault::kSwapped);
+  std::vector<std::vector<fs::path>> scenes;  // The meshes of every run.
+  for (std::size_t i = 0; i < options.meshes.size(); ++i) {
+    scenes.push_back({MeshFile(options.meshes[i])});
+    if (swapped && !options.swapped_for.empty()) scenes.back().push_back(MeshFile(options.swapped_for));
+  }
+  if (scenes.empty()) scenes.emplace_back();
+  Json result;
+  result["seed"] = options.common.seed;
+  result["objects"] = Json::array();
+  std::string summary;
+  for (const std::vector<fs::path>& meshes : scenes) {
+    const simulation::WorldParams world = WorldFor(base, meshes);
+    if (world.objects.empty()) throw std::runtime_error(options.world + ": has no objects; name one with --mesh");
+    const std::optional<int> other =
+        swapped && world.objects.size() > 1 ? std::optional(static_cast<int>(world.objects.size()) - 1) : std::nullopt;
+    OrbitRun run(options, params.learner, world, other);
+    run.Run();
+    result["objects"].push_back(run.Result());
+    const std::string text = SummaryOf(result["objects"].back());
+    if (options.common.json != "-" && scenes.size() > 1) std::cerr << text << std::flush;
+    summary += text;
+  }
+  WriteResult(options.common, result, summary);
+}
+
+}  // namespace
+
+void AddEvaluateLearner(CLI::App& evaluate, Run& run) {
+  auto options = std::make_shared<LearnerOptions>();
+  CLI::App* verb = evaluate.add_subcommand(
+      "learner",
+      "The learner while a simulated camera circles an object: is it tracked, how far does it drift, are all views right");
+  AddCommonOptions(*verb, options->common);
+  verb->add_option(
+          "--mesh", options->meshes,
+          "What stands on the table: a mesh (OBJ or PLY), a folder with textured.obj, or its name in meshes/ of $VANTAGE_DATA; "
+          "several, parted by commas, are taken in turn")
+      ->delimiter(',')
+      ->type_name("MESH[,...]");
+  verb->add_option("--world", options->world, "The room, as config/worlds/table.yaml; without --mesh its first object is learned")
+      ->type_name("FILE");
+  verb->add_option("--fault", options->fault, "What goes wrong on the way")
+      ->check(CLI::IsMember(simulation::FaultNames()))
+      ->capture_default_str();
+  verb->add_option("--swapped-for", options->swapped_for, "With --fault swapped and --mesh: the mesh that takes the object's place")
+      ->type_name("MESH");
+  verb->add_option("--frames", options->frames, "Stop after so many frames (default: two circles)")
+      ->check(CLI::Range(1, 1000000))
+      ->type_name("N");
+  verb->add_flag("--quick", options->quick, "One circle at 10 Hz instead of two at 30");
+  verb->add_flag("--tell-poses", options->tell_poses, "The learner is told where the camera is");
+  verb->add_option("--save", options->save, "Write frames.csv, views.csv, plot.png (where gnuplot is found) and pictures here")
+      ->type_name("DIR");
+  verb->callback([options, &run] { run = [options] { RunEvaluateLearner(*options); }; });
+}
+
+}  // namespace vantage::cli

@@ -1,0 +1,205 @@
+// The figures of a learner's trial, its tables and its plot.
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+
+#include "vantage/learner_trial.h"
+
+namespace vantage::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+double Round(double value) { return std::round(value * 1e3) / 1e3; }
+Json Rounded(double value) { return Number(Round(value)); }
+
+Json TrackingFigures(const std::vector<TrialStep>& steps) {
+  int usable = 0, tracked = 0, wrong = 0;
+  std::vector<PoseError> errors;
+  for (const TrialStep& step : steps) {
+    usable += step.truth.usable;
+    tracked += step.truth.usable && step.tracked && !step.wrong;
+    wrong += step.wrong;
+    if (step.error && step.truth.usable) errors.push_back(*step.error);
+  }
+  Json figures;
+  figures["usable"] = usable;
+  figures["tracked"] = tracked;  // Of the usable, and right.
+  figures["tracked_share"] = usable > 0 ? Rounded(static_cast<double>(tracked) / usable) : Json(nullptr);
+  figures["wrong"] = wrong;
+  figures["error"] = ErrorFigures(errors);
+  return figures;
+}
+
+Json ViewFigures(const LearnerTrial& trial) {
+  std::vector<PoseError> errors;
+  int wrong = 0, without_object = 0;
+  for (const ViewError& view : trial.ViewErrors()) {
+    wrong += view.wrong();
+    without_object += !view.error;
+    if (view.error) errors.push_back(*view.error);
+  }
+  Json figures;
+  figures["count"] = errors.size() + static_cast<std::size_t>(without_object);
+  figures["wrong"] = wrong;  // Off by more than 20 mm or 5 degrees, or without the object.
+  figures["without_object"] = without_object;
+  figures["error"] = ErrorFigures(errors);
+  return figures;
+}
+
+// How long after the fault the object was tracked (and rightly) again: from the first usable frame on. null = never.
+Json FaultFigures(const std::vector<TrialStep>& steps) {
+  const auto last = std::find_if(steps.rbegin(), steps.rend(), [](const TrialStep& step) { return step.truth.faulty; });
+  if (last == steps.rend()) return nullptr;
+  Json figures;
+  int tracked_wrongly = 0;
+  for (const TrialStep& step : steps) tracked_wrongly += step.truth.faulty && step.wrong;
+  figures["tracked_wrongly"] = tracked_wrongly;
+  figures["tracked_again_after_s"] = nullptr;
+  std::optional<double> usable_from_s;
+  for (auto step = last.base(); step != steps.end(); ++step) {
+    if (step->truth.usable && !usable_from_s) usable_from_s = step->truth.time_s;
+    if (usable_from_s && step->tracked && !step->wrong) {
+      figures["tracked_again_after_s"] = Rounded(step->truth.time_s - *usable_from_s);
+      break;
+    }
+  }
+  return figures;
+}
+
+Json Spread(const std::vector<double>& values) {
+  return {{"median", Rounded(Quantile(values, 0.5))},
+          {"p95", Rounded(Quantile(values, 0.95))},
+          {"max", Rounded(Quantile(values, 1.0))}};
+}
+
+std::string Quoted(std::string text) {
+  std::replace(text.begin(), text.end(), '"', '\'');
+  return '"' + text + '"';
+}
+
+std::string FrameTable(const LearnerTrial& trial) {
+  std::ostringstream table;
+  table.precision(6);
+  table << "frame,time_s,circle,faulty,usable,state,tracked,wrong,error_mm,error_deg,confidence,probability,inliers,reference_view,"
+           "view_added,views,points,ms,cpu_ms,memory_mb,note\n";
+  for (const TrialStep& step : trial.steps()) {
+    const learning::LearnerResult& result = step.result;
+    table << step.frame_id << ',' << step.truth.time_s << ',' << step.truth.circle << ',' << step.truth.faulty << ','
+          << step.truth.usable << ',' << learning::ToString(result.state) << ',' << step.tracked << ',' << step.wrong << ',';
+    if (step.error)
+      table << step.error->translation_mm << ',' << step.error->rotation_deg;
+    else
+      table << "NaN,NaN";
+    table << ',' << result.confidence.value << ',' << result.probability << ',' << result.inliers << ',' << result.reference_view
+          << ',' << result.view_added << ',' << step.views << ',' << step.points << ',' << step.ms << ',' << step.cpu_ms << ','
+          << step.memory_mb << ',' << Quoted(result.note) << '\n';
+  }
+  return table.str();
+}
+
+std::string ViewTable(const LearnerTrial& trial) {
+  std::ostringstream table;
+  table.precision(6);
+  table << "view,frame,wrong,error_mm,error_deg\n";
+  for (const ViewError& view : trial.ViewErrors()) {
+    table << view.id << ',' << view.frame_id << ',' << view.wrong() << ',';
+    if (view.error)
+      table << view.error->translation_mm << ',' << view.error->rotation_deg << '\n';
+    else
+      table << "NaN,NaN\n";
+  }
+  return table.str();
+}
+
+const char* const kPlot = R"(set terminal pngcairo size 1400,1100 font 'sans,10'
+set output 'plot.png'
+set datafile separator ','
+set key outside right top
+set grid
+set multiplot layout 4,1 title TITLE noenhanced
+set ylabel 'error'
+set yrange [0:*<30]
+plot 'frames.csv' using 'time_s':'error_mm' with points pt 7 ps 0.4 title 'frame, mm', '' using 'time_s':'error_deg' with points pt 7 ps 0.4 title 'frame, deg', 'views.csv' using (TIME(column('frame'))):'error_mm' with points pt 6 ps 1.5 title 'view at the end, mm'
+set ylabel 'c, p(o|c)'
+set yrange [0:1.05]
+plot 'frames.csv' using 'time_s':'confidence' with lines title 'c', '' using 'time_s':'probability' with lines title 'p(o|c)', '' using 'time_s':'tracked' with dots title 'tracked', '' using 'time_s':(column('faulty')*0.5) with filledcurves y1=0 fs transparent solid 0.2 title 'fault'
+set ylabel 'ms'
+set yrange [0:*]
+plot 'frames.csv' using 'time_s':'ms' with points pt 7 ps 0.3 title 'wall', '' using 'time_s':'cpu_ms' with points pt 7 ps 0.3 title 'processor'
+set ylabel 'views'
+set xlabel 'time, s'
+set y2tics
+plot 'frames.csv' using 'time_s':'views' with lines title 'views', '' using 'time_s':'points' axes x1y2 with lines title 'points (right)', '' using 'time_s':'memory_mb' axes x1y2 with lines title 'memory, MB (right)'
+)";
+
+}  // namespace
+
+Json ErrorFigures(const std::vector<PoseError>& errors) {
+  std::vector<double> mm, deg;
+  for (const PoseError& error : errors) {
+    mm.push_back(error.translation_mm);
+    deg.push_back(error.rotation_deg);
+  }
+  return {{"mm", Spread(mm)}, {"deg", Spread(deg)}};
+}
+
+Json FiguresOf(const LearnerTrial& trial) {
+  const std::vector<TrialStep>& steps = trial.steps();
+  std::vector<double> ms, cpu_ms;
+  for (const TrialStep& step : steps) {
+    ms.push_back(step.ms);
+    cpu_ms.push_back(step.cpu_ms);
+  }
+  Json figures;
+  figures["frames"] = steps.size();
+  figures["tracking"] = TrackingFigures(steps);
+  figures["views"] = ViewFigures(trial);
+  figures["after_fault"] = FaultFigures(steps);
+  figures["ms"] = Spread(ms);
+  figures["cpu_ms"] = Spread(cpu_ms);
+  figures["memory_mb"] = {{"first", Rounded(steps.empty() ? NAN : steps.front().memory_mb)},
+                          {"last", Rounded(steps.empty() ? NAN : steps.back().memory_mb)}};
+  return figures;
+}
+
+Json PointFigures(const LearnerTrial& trial, const rendering::SurfaceDistance& surface) {
+  Json figures;
+  const auto object = trial.learner().object();
+  if (!object || !trial.T_mesh_object()) return nullptr;
+  std::vector<double> mm;
+  for (const double distance_m : surface.Of(*trial.T_mesh_object() * object->PointMatrix())) mm.push_back(1e3 * distance_m);
+  figures["count"] = mm.size();
+  figures["surface_mm"] = Spread(mm);
+  return figures;
+}
+
+void SaveTrial(const LearnerTrial& trial, const std::string& title, const fs::path& folder) {
+  std::error_code failed;
+  fs::create_directories(folder, failed);
+  if (failed) throw std::runtime_error(folder.string() + ": cannot be made: " + failed.message());
+  WriteWhole(folder / "frames.csv", FrameTable(trial));
+  WriteWhole(folder / "views.csv", ViewTable(trial));
+  // Frame numbers of views to times: frames come evenly.
+  const std::vector<TrialStep>& steps = trial.steps();
+  double first_s = 0.0, per_frame_s = 1.0;
+  if (steps.size() > 1) {
+    per_frame_s = (steps.back().truth.time_s - steps.front().truth.time_s) /
+                  static_cast<double>(std::max<std::int64_t>(1, steps.back().frame_id - steps.front().frame_id));
+    first_s = steps.front().truth.time_s - per_frame_s * static_cast<double>(steps.front().frame_id);
+  }
+  std::ostringstream plot;
+  plot << "TITLE = " << Quoted(title) << "\nTIME(frame) = " << first_s << " + " << per_frame_s << " * frame\n" << kPlot;
+  WriteWhole(folder / "plot.gnuplot", plot.str());
+  // Without gnuplot the tables and the script are there all the same.
+  std::string where = folder.string();
+  for (std::size_t at = 0; (at = where.find('\'', at)) != std::string::npos; at += 4) where.replace(at, 1, "'\\''");
+  if (std::system(("cd '" + where + "' && command -v gnuplot >/dev/null && gnuplot plot.gnuplot 2>gnuplot.log && rm -f gnuplot.log")
+                      .c_str()) != 0) {
+    return;
+  }
+}
+
+}  // namespace vantage::cli
