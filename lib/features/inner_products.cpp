@@ -27,4 +27,23 @@ __attribute__((target_clones("arch=x86-64-v3", "default"))) void InnerProducts(c
   }
 }
 
+__attribute__((target_clones("arch=x86-64-v3", "default"))) void InnerProductsOfOne(const float* columns, const float* row,
+                                                                                    int length, float* products) {
+  constexpr int kParts = 4;  // Sums that do not wait for each other.
+  Lanes low[kParts] = {}, high[kParts] = {};
+  int i = 0;
+  for (; i + kParts <= length; i += kParts) {
+    for (int p = 0; p < kParts; ++p) {
+      low[p] += *reinterpret_cast<const Lanes*>(columns + (i + p) * kProductColumns) * row[i + p];
+      high[p] += *reinterpret_cast<const Lanes*>(columns + (i + p) * kProductColumns + kLanes) * row[i + p];
+    }
+  }
+  for (; i < length; ++i) {
+    low[0] += *reinterpret_cast<const Lanes*>(columns + i * kProductColumns) * row[i];
+    high[0] += *reinterpret_cast<const Lanes*>(columns + i * kProductColumns + kLanes) * row[i];
+  }
+  *reinterpret_cast<Lanes*>(products) = (low[0] + low[1]) + (low[2] + low[3]);
+  *reinterpret_cast<Lanes*>(products + kLanes) = (high[0] + high[1]) + (high[2] + high[3]);
+}
+
 }  // namespace vantage::features

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+#include <tuple>
 
 namespace vantage::recognition {
 namespace {
@@ -12,7 +13,14 @@ constexpr double kWeightStep = 0.02;      // ln N_i that is out by less is not w
 constexpr float kCodeScale = 127 / 0.7f;  // Unit descriptors of 64 or 128 values hardly hold a value beyond 0.7.
 constexpr int kTrainingSample = 128;      // Rows a cluster that k-means looks at (KMeansParams), for the cost of a split.
 
-std::int8_t Encode(float value) { return static_cast<std::int8_t>(std::lround(std::clamp(value * kCodeScale, -127.f, 127.f))); }
+// 8 bits a value, rounded.
+template <typename Code>
+void Encode(const float* row, int length, Code* codes) {
+  for (int i = 0; i < length; ++i) {
+    const float value = std::min(127.f, std::max(-127.f, row[i] * kCodeScale));
+    codes[i] = static_cast<Code>(value + (value < 0.f ? -0.5f : 0.5f));
+  }
+}
 
 __attribute__((target_clones("arch=x86-64-v3", "default"))) void CodeProducts(const std::int16_t* query, const std::int8_t* codes,
                                                                               int count, int length, std::int32_t* products) {
@@ -106,10 +114,11 @@ void InvertedFile::CountHolder(Leaf& leaf, int object, int points) {
 
 void InvertedFile::Insert(int index, int slot, const int* keypoints, int count, const cv::Mat& descriptors) {
   Leaf& leaf = leaves_[index];
+  std::vector<std::int8_t> code(descriptors.cols);
   for (int i = 0; i < count; ++i) {
     leaf.points.push_back({slot, keypoints[i]});
-    const float* row = descriptors.ptr<float>(keypoints[i]);
-    for (int j = 0; j < descriptors.cols; ++j) leaf.codes.push_back(Encode(row[j]));
+    Encode(descriptors.ptr<float>(keypoints[i]), descriptors.cols, code.data());
+    leaf.codes.insert(leaf.codes.end(), code.begin(), code.end());
   }
   if (!leaf.stopped) slots_[slot].Add(1.0, count, leaf.log_objects);
   CountHolder(leaf, slots_[slot].object, count);
@@ -266,31 +275,34 @@ std::vector<Ranked> InvertedFile::Rank(const Words& words, int count, int paths)
 
   // |q/|q| - d/|d|| needs only what both have: 2 - 2 sum min(q_i, d_i) in L1, 2 - 2 sum q_i d_i squared in L2.
   std::vector<double> norms(slots_.size(), 0.0), common(slots_.size(), 0.0);
+  std::vector<int> touched;
   for (const Term& term : terms) {
     const double q = term.value / query_norm;
     ForEachRun(*term.leaf, [&](int slot, int frequency) {
       double& norm = norms[slot];
-      if (norm == 0.0) norm = std::max(1e-12, NormOf(slots_[slot], log_documents));
+      if (norm == 0.0) {
+        norm = std::max(1e-12, NormOf(slots_[slot], log_documents));
+        touched.push_back(slot);
+      }
       const double d = frequency * term.weight / norm;
       common[slot] += params_.norm == Norm::kL1 ? std::min(q, d) : q * d;
     });
   }
-  std::vector<Ranked> ranking;
-  for (const auto& [object, views] : views_of_) {
-    Ranked best{object, 0, 2.0};
-    double most = 0.0;
-    for (const auto& [view, slot] : views) {
-      if (common[slot] <= most) continue;
-      most = common[slot];
-      best.view = view;
-    }
-    if (most <= 0.0) continue;
-    const double left = std::max(0.0, 2.0 - 2.0 * most);
-    best.score = params_.norm == Norm::kL1 ? left : std::sqrt(left);
-    ranking.push_back(best);
+  std::vector<int> best(views_of_.rbegin()->first + 1, -1);  // The most similar view's slot by object.
+  for (const int slot : touched) {
+    int& most = best[slots_[slot].object];
+    if (most < 0 || std::make_pair(common[most], slots_[slot].view) < std::make_pair(common[slot], slots_[most].view)) most = slot;
   }
-  std::stable_sort(ranking.begin(), ranking.end(), [](const Ranked& a, const Ranked& b) { return a.score < b.score; });
-  if (static_cast<int>(ranking.size()) > count) ranking.resize(std::max(0, count));
+  std::vector<Ranked> ranking;
+  for (const int slot : best) {
+    if (slot < 0) continue;
+    const double left = std::max(0.0, 2.0 - 2.0 * common[slot]);
+    ranking.push_back({slots_[slot].object, slots_[slot].view, params_.norm == Norm::kL1 ? left : std::sqrt(left)});
+  }
+  const auto first = ranking.begin() + std::min<std::ptrdiff_t>(std::max(0, count), ranking.end() - ranking.begin());
+  std::partial_sort(ranking.begin(), first, ranking.end(),
+                    [](const Ranked& a, const Ranked& b) { return std::tie(a.score, a.object) < std::tie(b.score, b.object); });
+  ranking.erase(first, ranking.end());
   return ranking;
 }
 
@@ -307,7 +319,7 @@ std::vector<std::vector<Neighbour>> InvertedFile::Nearest(const cv::Mat& query, 
   std::vector<std::int32_t> products;
   std::vector<Candidate> best;
   for (int row = 0; row < query.rows; ++row) {
-    for (int i = 0; i < length; ++i) code[i] = Encode(query.at<float>(row, i));
+    Encode(query.ptr<float>(row), length, code.data());
     best.clear();
     for (int w = 0; w < words.paths && words.of(row)[w] >= 0; ++w) {
       const Leaf& leaf = leaves_[words.of(row)[w]];

@@ -125,7 +125,11 @@ void CompareWithCentroids(const float* packed, int count, int length, const floa
   float products[kComparedRows * kBlock];
   const int padded = PaddedCount(count);
   for (int start = 0; start < count; start += kBlock) {
-    features::InnerProducts(packed, four, length, products);
+    if (row_count == 1) {
+      features::InnerProductsOfOne(packed, rows[0], length, products);
+    } else {
+      features::InnerProducts(packed, four, length, products);
+    }
     const float* half_norms = packed + kBlock * length;
     for (int r = 0; r < row_count; ++r) {
       for (int c = 0; c < kBlock; ++c) excess[r * padded + start + c] = half_norms[c] - products[r * kBlock + c];

@@ -169,80 +169,48 @@ struct Reached {
   bool operator<(const Reached& other) const { return excess != other.excess ? excess < other.excess : node < other.node; }
 };
 
-// The best few nodes of every row, best first.
-class Beams {
- public:
-  Beams(int rows, int paths) : paths_(paths), reached_(static_cast<std::size_t>(rows) * paths), counts_(rows, 0) {}
-
-  int count(int row) const { return counts_[row]; }
-  const Reached& at(int row, int i) const { return reached_[static_cast<std::size_t>(row) * paths_ + i]; }
-
-  void Offer(int row, const Reached& candidate) {
-    Reached* best = reached_.data() + static_cast<std::size_t>(row) * paths_;
-    int& count = counts_[row];
-    if (count == paths_ && !(candidate < best[count - 1])) return;
-    int at = count < paths_ ? count++ : count - 1;
-    for (; at > 0 && candidate < best[at - 1]; --at) best[at] = best[at - 1];
-    best[at] = candidate;
+// Keeps the best `most`, best first.
+void Offer(std::vector<Reached>& best, std::size_t most, const Reached& candidate) {
+  if (best.size() == most) {
+    if (!(candidate < best.back())) return;
+  } else {
+    best.emplace_back();
   }
-
- private:
-  int paths_;
-  std::vector<Reached> reached_;
-  std::vector<int> counts_;
-};
-
-struct Visit {
-  int node;
-  int row;
-};
+  std::size_t at = best.size() - 1;
+  for (; at > 0 && candidate < best[at - 1]; --at) best[at] = best[at - 1];
+  best[at] = candidate;
+}
 
 }  // namespace
 
 Words VocabularyTree::Quantise(const cv::Mat& descriptors, int paths) const {
   CheckRows(descriptors, length_);
   if (paths < 1) throw std::invalid_argument("vocabulary: paths must be >= 1, is " + std::to_string(paths));
-  const int row_count = descriptors.rows;
-  const std::vector<const float*> rows = RowPointers(descriptors);
-  Beams beams(row_count, paths);
-  for (int row = 0; row < row_count; ++row) beams.Offer(row, {0.f, 0});
-  std::vector<float> excess(static_cast<std::size_t>(kComparedRows) * PaddedCount(params_.branching));
-  std::vector<Visit> visits;
-  while (true) {  // One level at a time, so that rows at the same node share a pass over its centroids.
-    visits.clear();
-    Beams next(row_count, paths);
-    for (int row = 0; row < row_count; ++row) {
-      for (int i = 0; i < beams.count(row); ++i) {
-        const Reached& reached = beams.at(row, i);
-        if (nodes_[reached.node].children > 0) {
-          visits.push_back({reached.node, row});
-        } else {
-          next.Offer(row, reached);
-        }
-      }
-    }
-    if (visits.empty()) break;
-    std::stable_sort(visits.begin(), visits.end(), [](const Visit& a, const Visit& b) { return a.node < b.node; });
-    for (std::size_t start = 0, end = 0; start < visits.size(); start = end) {
-      const Node& node = nodes_[visits[start].node];
-      const float* four[kComparedRows];
-      for (; end < visits.size() && end < start + kComparedRows && visits[end].node == visits[start].node; ++end) {
-        four[end - start] = rows[visits[end].row];
-      }
-      CompareWithCentroids(Centroids(node.block), node.children, length_, four, static_cast<int>(end - start), excess.data());
-      for (std::size_t v = start; v < end; ++v) {
-        const float* values = excess.data() + (v - start) * PaddedCount(node.children);
-        for (int c = 0; c < node.children; ++c) next.Offer(visits[v].row, {values[c], node.first_child + c});
-      }
-    }
-    beams = std::move(next);
-  }
   Words words;
   words.paths = paths;
-  words.leaves.assign(static_cast<std::size_t>(row_count) * paths, -1);
-  for (int row = 0; row < row_count; ++row) {
-    for (int i = 0; i < beams.count(row); ++i) {
-      words.leaves[static_cast<std::size_t>(row) * paths + i] = nodes_[beams.at(row, i).node].leaf;
+  words.leaves.assign(static_cast<std::size_t>(descriptors.rows) * paths, -1);
+  std::vector<float> excess(PaddedCount(params_.branching));
+  std::vector<Reached> reached, next;
+  for (int r = 0; r < descriptors.rows; ++r) {
+    const float* row = descriptors.ptr<float>(r);
+    reached.assign(1, {0.f, 0});
+    for (bool deeper = nodes_[0].children > 0; deeper;) {
+      deeper = false;
+      next.clear();
+      for (const Reached& from : reached) {
+        const Node& node = nodes_[from.node];
+        if (node.children == 0) {
+          Offer(next, paths, from);
+          continue;
+        }
+        CompareWithCentroids(Centroids(node.block), node.children, length_, &row, 1, excess.data());
+        for (int c = 0; c < node.children; ++c) Offer(next, paths, {excess[c], node.first_child + c});
+      }
+      for (const Reached& to : next) deeper = deeper || nodes_[to.node].children > 0;
+      reached.swap(next);
+    }
+    for (std::size_t i = 0; i < reached.size(); ++i) {
+      words.leaves[static_cast<std::size_t>(r) * paths + i] = nodes_[reached[i].node].leaf;
     }
   }
   return words;
