@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
   vantage::cli::AddExplore(app, run);
   vantage::cli::AddModels(app, run);
   vantage::cli::AddEvaluate(app, run);
+  vantage::cli::AddVocabulary(app, run);
   if (const std::string word = UnknownVerb(app, argc, argv); !word.empty()) {
     return Fail("vantage", "there is no verb '" + word + "'; see vantage --help");
   }

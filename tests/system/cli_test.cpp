@@ -9,6 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <sstream>
 
 #include "support/data.h"
@@ -94,7 +95,8 @@ class Cli : public ::testing::Test {
 };
 
 TEST_F(Cli, HelpAndVersionOfEveryVerb) {
-  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "evaluate learner", "models list", "models show"}) {
+  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "evaluate learner", "models list", "models show",
+                           "vocabulary train", "vocabulary show"}) {
     SCOPED_TRACE(verb);
     const Outcome help = Run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
@@ -121,6 +123,7 @@ TEST_F(Cli, MisuseIsOneLine) {
   ExpectRefused("recognise --sequence a", "vantage recognise", {"--store"});
   ExpectRefused("models", "vantage models", {});
   ExpectRefused("models show --store a", "vantage models show", {"object"});
+  ExpectRefused("vocabulary train --out a", "vantage vocabulary train", {"images"});
   ExpectRefused("explore", "vantage explore", {"--sequence", "--world", "--mesh"});
   ExpectRefused("explore --sequence a", "vantage explore", {"--object-id"});
   ExpectRefused("explore --world w.yaml --strategy best", "vantage explore", {"best"});
@@ -266,6 +269,46 @@ TEST_F(Cli, LearnsRecognisesAndShows) {
   ExpectRefused("models show mug --store a.db", "vantage models show", {"a.db", "mug"});
   EXPECT_EQ(Files(), (std::vector<std::string>{"a.db", "b.db", "found.csv", "found.json"}))
       << "stores are one file each when closed";
+}
+
+TEST_F(Cli, AVocabularyIsTrainedAndShown) {
+  fs::create_directories(folder_ / "photos" / "more");
+  cv::RNG random(7);
+  for (const char* name : {"photos/b.png", "photos/a.jpg", "photos/more/c.png"}) {
+    cv::Mat image(240, 320, CV_8UC1);
+    random.fill(image, cv::RNG::UNIFORM, 0, 255);
+    cv::blur(image, image, {5, 5});
+    cv::normalize(image, image, 0, 255, cv::NORM_MINMAX);
+    cv::imwrite((folder_ / name).string(), image);
+  }
+  Write("photos/notes.txt", "no image");
+  const Outcome trained = Run("vocabulary train photos --out a.voc --branching 4 --depth 3 --json -");
+  ASSERT_EQ(trained.code, 0) << trained.err;
+  EXPECT_NE(trained.err.find("training: 100 %"), std::string::npos) << trained.err;
+  const Json result = Json::parse(trained.out);
+  EXPECT_EQ(result.at("images"), 3);
+  EXPECT_GT(result.at("leaves"), 30);
+  EXPECT_LE(result.at("leaves"), 64);
+  EXPECT_EQ(result.at("trained_with"), result.at("descriptors"));
+  EXPECT_EQ(Run("vocabulary train photos --out b.voc --branching 4 --depth 3 --max-descriptors 200").code, 0);
+  const Json shown = Json::parse(Run("vocabulary show a.voc --json -").out);
+  EXPECT_EQ(shown.at("leaves"), result.at("leaves"));
+  EXPECT_EQ(shown.at("descriptor"), "sift");
+  EXPECT_EQ(shown.at("length"), 128);
+
+  const std::string whole = ReadFile(folder_ / "a.voc");
+  Write("a.voc", whole.substr(0, whole.size() / 2));
+  ExpectRefused("vocabulary show a.voc", "vantage vocabulary show", {"a.voc", "damaged", "vantage vocabulary train"});
+  ExpectRefused("vocabulary show photos/notes.txt", "vantage vocabulary show", {"photos/notes.txt", "expected a vocabulary file"});
+  ExpectRefused("vocabulary train none --out c.voc", "vantage vocabulary train", {"none"});
+  ExpectRefused("vocabulary train photos/notes.txt --out c.voc", "vantage vocabulary train", {"notes.txt", "expected an image"});
+  ExpectRefused("vocabulary train photos --branching 1 --out c.voc", "vantage vocabulary train", {"branching"});
+  ExpectRefused("vocabulary train photos --out none/c.voc", "vantage vocabulary train", {"none"});
+  fs::create_directories(folder_ / "empty");
+  ExpectRefused("vocabulary train empty --out c.voc", "vantage vocabulary train", {"empty", "found none"});
+  cv::imwrite((folder_ / "empty" / "grey.png").string(), cv::Mat(48, 64, CV_8UC1, cv::Scalar(90)));
+  EXPECT_NE(Run("vocabulary train empty --out c.voc").err.find("no interest points"), std::string::npos);
+  EXPECT_EQ(Files(), (std::vector<std::string>{"a.voc", "b.voc", "empty", "photos"}));
 }
 
 }  // namespace
