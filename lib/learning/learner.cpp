@@ -3,23 +3,31 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
 
 #include "learning/keyframe.h"
-#include "recognition/guided.h"
+#include "learning/tracker.h"
 
 namespace vantage::learning {
 namespace {
 
-constexpr double kSeen = 0.5;  // p(o|c) from which a pose counts as the object's.
+constexpr double kSeen = 0.5;       // p(o|c) from which a pose counts as the object's.
+constexpr double kMaxGap_s = 0.25;  // After a longer gap between frames the last motion says nothing about where the object is.
 
-// A pose of the object in a frame, with what speaks for it.
-struct Track {
+double Seconds(std::int64_t from_us, std::int64_t to_us) { return 1e-6 * static_cast<double>(to_us - from_us); }
+
+// Where the object was in the last frames.
+struct History {
   geometry::Rigid T_camera_object = geometry::Rigid::Identity();
-  features::Features features;
-  std::vector<recognition::GuidedMatch> matches;
-  model::Confidence confidence;
-  double probability = 0.0;
+  std::int64_t utime = 0;
+  std::optional<geometry::Rigid> before;  // In the frame before that one, where it was tracked there.
+  std::int64_t before_utime = 0;
+  double error_px = 0.0;  // How far the last prediction was off.
+};
+
+// A found pose and how it was found.
+struct Found {
+  Track track;
+  bool followed = false;  // Where the last frames or the mount led; else by recognition.
 };
 
 }  // namespace
@@ -38,44 +46,35 @@ std::string ToString(State state) {
   return "";
 }
 
-void LearnerParams::Check() const {
-  plane.Check();
-  clusters.Check();
-  recogniser.Check();
-  const auto require = [](bool ok, const char* what) {
-    if (!ok) throw std::invalid_argument(std::string("learner: ") + what);
-  };
-  require(new_view_confidence > 0.0 && new_view_confidence < 1.0, "new_view_confidence must be in (0, 1)");
-  require(min_track_probability > 0.0 && min_track_probability < 1.0, "min_track_probability must be in (0, 1)");
-  require(min_view_points >= 4, "min_view_points must be >= 4");
-  require(min_view_angle_deg >= 0.0, "min_view_angle_deg must be >= 0");
-  require(surface_samples >= 0, "surface_samples must be >= 0");
-  require(surface_views >= 1, "surface_views must be >= 1");
-  require(roi_margin >= 0.0, "roi_margin must be >= 0");
-  require(max_mount_translation_m > 0.0, "max_mount_translation_m must be > 0");
-  require(max_mount_rotation_deg > 0.0, "max_mount_rotation_deg must be > 0");
-  require(mount_sigma_m > 0.0, "mount_sigma_m must be > 0");
-  require(mount_sigma_deg > 0.0, "mount_sigma_deg must be > 0");
-  require(agreement_prior >= 0.5 && agreement_prior < 1.0, "agreement_prior must be in [1/2, 1)");
-}
-
 struct Learner::Impl {
   LearnerParams params;
   std::string name;
+  Tracker tracker;
   std::shared_ptr<const model::ObjectModel> object;
   recognition::Recogniser recogniser;
+  bool recogniser_is_current = false;  // It is told of a changed model only when it is needed.
   State state = State::kSearching;
+  int confirmations = 0;  // Frames that agreed since the object was found again.
   int reference_view = -1;
-  std::optional<geometry::Rigid> last_pose;  // T_camera_object of the last frame, where it was tracked.
+  std::optional<History> history;
   std::optional<geometry::Rigid> T_world_object;
+  std::optional<geometry::Rigid> T_world_elsewhere;  // Where it was found while it was gone from there.
+  int elsewhere = 0;                                 // So many times in a row.
   std::optional<segmentation::Plane> plane;
   std::vector<segmentation::Cluster> clusters;
 
-  Impl(const LearnerParams& p, const std::string& object_name) : params(p), name(object_name), recogniser(p.recogniser) {}
+  Impl(const LearnerParams& p, const std::string& object_name)
+      : params(p), name(object_name), tracker(p), recogniser(p.recogniser) {}
 
   void Adopt(model::ObjectModel changed) {
     object = std::make_shared<const model::ObjectModel>(std::move(changed));
-    recogniser.Set(object);
+    recogniser_is_current = false;
+  }
+
+  const recognition::Recogniser& CurrentRecogniser() {
+    if (!recogniser_is_current) recogniser.Set(object);
+    recogniser_is_current = true;
+    return recogniser;
   }
 
   bool Segment(const rgbd::Frame& frame) {
@@ -112,7 +111,7 @@ struct Learner::Impl {
     }
     Adopt(std::move(*first));
     if (frame.T_world_camera) T_world_object = *frame.T_world_camera * T_camera_object;
-    last_pose = T_camera_object;
+    Remember(frame, T_camera_object, std::nullopt);
     reference_view = 0;
     state = result.state = State::kTracking;
     result.T_camera_object = T_camera_object;
@@ -123,7 +122,7 @@ struct Learner::Impl {
     return result;
   }
 
-  // --- Tracking ---
+  // --- Where the object is expected ---
 
   // Where the mount says the object is, if it says.
   std::optional<geometry::Rigid> MountPose(const rgbd::Frame& frame) const {
@@ -131,113 +130,58 @@ struct Learner::Impl {
     return frame.T_world_camera->inverse() * *T_world_object;
   }
 
-  // The part of the image the object can be in: around where it was seen last or where the mount says it is. Empty: anywhere.
-  cv::Mat RegionOfInterest(const rgbd::Frame& frame, const std::optional<geometry::Rigid>& expected) const {
-    if (!expected) return {};
-    std::vector<cv::Point2f> pixels;
-    for (const model::ModelPoint& point : object->points) {
-      if (const auto pixel = frame.camera.Project(*expected * point.position)) pixels.emplace_back(pixel->x(), pixel->y());
+  // Where the motion of the last frames leads. nullopt where the object was not seen of late.
+  std::optional<geometry::Rigid> Predicted(const rgbd::Frame& frame) const {
+    if (!history) return std::nullopt;
+    const double ahead_s = Seconds(history->utime, frame.utime);
+    if (!history->before || ahead_s > kMaxGap_s) return history->T_camera_object;
+    return Continued(*history->before, history->T_camera_object, Seconds(history->before_utime, history->utime), ahead_s);
+  }
+
+  std::optional<Expectation> Expected(const rgbd::Frame& frame) const {
+    const auto predicted = Predicted(frame);
+    const auto mount_pose = MountPose(frame);
+    if (!predicted && !mount_pose) return std::nullopt;
+    Expectation expectation;
+    expectation.T_camera_object = mount_pose ? *mount_pose : *predicted;
+    const double distance = std::max(0.05, expectation.T_camera_object.translation().norm());
+    const double size_px = frame.camera.fx * Size() / distance;
+    const bool steady = !mount_pose && history->before && Seconds(history->utime, frame.utime) <= kMaxGap_s;
+    expectation.margin_px =
+        steady ? std::max(params.min_roi_margin_px, 3.0 * history->error_px) : params.roi_margin * size_px + 20.0;
+    return expectation;
+  }
+
+  // The longest side of the box around the model's points, metres.
+  double Size() const {
+    const Eigen::Matrix3Xd points = object->PointMatrix();
+    if (points.cols() == 0) return 0.0;
+    return (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).maxCoeff();
+  }
+
+  void Remember(const rgbd::Frame& frame, const geometry::Rigid& T_camera_object, const std::optional<geometry::Rigid>& predicted) {
+    History now;
+    now.T_camera_object = T_camera_object;
+    now.utime = frame.utime;
+    if (history && Seconds(history->utime, frame.utime) <= kMaxGap_s) {
+      now.before = history->T_camera_object;
+      now.before_utime = history->utime;
+      if (predicted) now.error_px = LargestShift(*object, frame.camera, *predicted, T_camera_object);
     }
-    if (pixels.empty()) return {};
-    const cv::Rect box = cv::boundingRect(pixels);
-    const int margin = static_cast<int>(params.roi_margin * std::max(box.width, box.height)) + 20;
-    const cv::Rect area = cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) &
-                          cv::Rect(0, 0, frame.camera.width, frame.camera.height);
-    if (area.empty()) return {};
-    cv::Mat mask = cv::Mat::zeros(frame.camera.height, frame.camera.width, CV_8UC1);
-    mask(area).setTo(255);
-    return mask;
+    history = now;
   }
 
-  std::vector<pose::SurfacePoint> SurfaceNear(const geometry::Rigid& T_camera_object) const {
-    std::vector<pose::SurfacePoint> surface;
-    const std::vector<int> nearest = model::NearestViews(*object, T_camera_object, params.surface_views);
-    for (const int view : nearest) {
-      const auto part = SurfaceOfView(object->views[view], params.surface_samples / static_cast<int>(nearest.size()));
-      surface.insert(surface.end(), part.begin(), part.end());
-    }
-    return surface;
-  }
-
-  // The guided pose, drawn to the depth image by the surfaces of the nearest views and, where it agrees, to the mount's pose.
-  geometry::Rigid Refined(const rgbd::Frame& frame, const features::Features& features,
-                          const recognition::GuidedPose& guided) const {
-    std::vector<pose::Match2d3d> matches;
-    std::vector<int> all;
-    for (const recognition::GuidedMatch& match : guided.matches) {
-      const cv::Point2f& pixel = features.keypoints[match.keypoint].pt;
-      all.push_back(static_cast<int>(matches.size()));
-      matches.push_back({{pixel.x, pixel.y}, object->points[match.point].position, 0.0});
-    }
-    std::vector<pose::SurfacePoint> surface;
-    if (!frame.depth.empty() && params.surface_samples > 0) surface = SurfaceNear(guided.T_camera_object);
-    std::optional<pose::PosePrior> prior;
-    const auto expected = MountPose(frame);
-    if (expected && AgreesWithMount(guided.T_camera_object, *expected)) {
-      prior = pose::PosePrior{*expected, params.mount_sigma_m, params.mount_sigma_deg * M_PI / 180.0};
-    }
-    if (surface.empty() && !prior) return guided.T_camera_object;
-    return pose::RefinePoseOnSurface(matches, all, surface, frame, prior, guided.T_camera_object,
-                                     0.5 * params.recogniser.ransac.inlier_px);
-  }
-
-  // Guided matches, confidence and p(o|c) at a pose.
-  Track Judge(const rgbd::Frame& frame, features::Features features, const geometry::Rigid& T_camera_object, bool refine) const {
-    Track track;
-    const model::KeypointGrid grid(features.keypoints, frame.camera.width, frame.camera.height);
-    recognition::GuidedParams guided_params;
-    guided_params.radius_px = params.recogniser.guided_radius_px;
-    guided_params.max_distance = params.recogniser.guided_max_distance;
-    guided_params.inlier_px = params.recogniser.ransac.inlier_px;
-    rgbd::Frame query = frame;
-    if (!params.recogniser.use_query_depth) query.depth = cv::Mat();
-    const auto guided = recognition::MatchGuided(*object, T_camera_object, query, features, grid, guided_params);
-    track.matches = guided.matches;
-    track.T_camera_object = refine ? Refined(query, features, guided) : T_camera_object;
-    track.confidence = model::ObjectConfidence(*object, track.T_camera_object, query, grid, params.recogniser.confidence);
-    track.probability = object->measures.observed.Probability(track.confidence.value);
-    track.features = std::move(features);
-    return track;
-  }
-
-  // Against the reference view alone, as in the paper.
-  std::optional<Track> TrackReference(const rgbd::Frame& frame, features::Features features) const {
-    const model::View& reference = object->views[reference_view];
-    std::vector<pose::Match2d3d> matches;
-    for (const features::Match& match :
-         features::MatchRatio(features.descriptors, reference.features.descriptors, params.recogniser.max_ratio)) {
-      const cv::Point2f& pixel = features.keypoints[match.query].pt;
-      matches.push_back({{pixel.x, pixel.y}, object->points[reference.points[match.train]].position});
-    }
-    const auto estimate = pose::EstimatePose(matches, frame.camera, params.recogniser.use_query_depth ? &frame : nullptr,
-                                             params.recogniser.ransac, params.recogniser.seed);
-    if (!estimate || static_cast<int>(estimate->inliers.size()) < params.recogniser.min_inliers) return std::nullopt;
-    return Judge(frame, std::move(features), estimate->T_camera_object, true);
-  }
-
-  // By the whole model, anywhere in the image.
-  std::optional<Track> Relocalise(const rgbd::Frame& frame) const {
-    features::Features features = recogniser.Extract(frame);
-    const auto detections = recogniser.Recognise(frame, features);
-    if (detections.empty()) return std::nullopt;
-    return Judge(frame, std::move(features), detections.front().T_camera_object, true);
-  }
-
-  bool AgreesWithMount(const geometry::Rigid& T_camera_object, const geometry::Rigid& expected) const {
-    const geometry::PoseDifference difference = geometry::Difference(T_camera_object, expected);
-    return difference.translation_m <= params.max_mount_translation_m &&
-           difference.rotation_rad <= params.max_mount_rotation_deg * M_PI / 180.0;
-  }
+  // --- Tracking ---
 
   bool ContradictsMount(const rgbd::Frame& frame, const geometry::Rigid& T_camera_object) const {
     const auto expected = MountPose(frame);
-    return params.require_mount_agreement && expected && !AgreesWithMount(T_camera_object, *expected);
+    return params.require_mount_agreement && expected && !tracker.Agree(T_camera_object, *expected);
   }
 
-  // A pose that was found without the mount and agrees with it is right far more often than one that is merely as confident.
-  void CreditAgreement(const rgbd::Frame& frame, std::optional<Track>* track) const {
-    const auto expected = MountPose(frame);
-    if (!*track || !expected || !AgreesWithMount((*track)->T_camera_object, *expected)) return;
+  // A pose that was found without the mount, or without the last frames, and agrees with them is right far more often than one that
+  // is merely as confident.
+  void CreditAgreement(const std::optional<geometry::Rigid>& expected, std::optional<Track>* track) const {
+    if (!*track || !expected || !tracker.Agree((*track)->T_camera_object, *expected)) return;
     (*track)->probability = object->measures.observed.Probability((*track)->confidence.value, params.agreement_prior);
   }
 
@@ -245,23 +189,102 @@ struct Learner::Impl {
     return track && track->probability >= kSeen && !ContradictsMount(frame, track->T_camera_object);
   }
 
-  // The reference view first, then the whole model where the mount says it is, then the whole model anywhere.
-  std::optional<Track> Find(const rgbd::Frame& frame) const {
-    const auto mount_pose = MountPose(frame);
-    const auto expected = mount_pose ? mount_pose : last_pose;
-    if (expected && reference_view >= 0) {
-      const features::Features features =
-          features::Extract(rgbd::Gray(frame), RegionOfInterest(frame, expected), params.recogniser.features);
-      auto track = TrackReference(frame, features);
-      CreditAgreement(frame, &track);
-      if (IsGood(frame, track)) return track;
-      if (mount_pose) track = Judge(frame, features, *mount_pose, true);
-      if (mount_pose && static_cast<int>(track->matches.size()) >= params.recogniser.min_inliers && IsGood(frame, track))
-        return track;
+  // The reference view and the views beside it.
+  std::vector<int> ViewsToTry(const geometry::Rigid& expected) const {
+    std::vector<int> views = {reference_view};
+    for (const int view : model::NearestViews(*object, expected, params.neighbour_views + 1)) {
+      if (view != reference_view && static_cast<int>(views.size()) <= params.neighbour_views) views.push_back(view);
     }
-    auto track = Relocalise(frame);
-    CreditAgreement(frame, &track);
+    return views;
+  }
+
+  // Around where it is expected: the reference view first, its neighbours, then the whole model where the mount says it is.
+  std::optional<Track> Follow(const rgbd::Frame& frame, const Expectation& expectation) const {
+    const auto mount_pose = MountPose(frame);
+    const features::Features features = tracker.ExtractAround(*object, frame, expectation);
+    if (features.size() < params.recogniser.min_inliers) return std::nullopt;
+    for (const int view : ViewsToTry(expectation.T_camera_object)) {
+      auto track = tracker.AgainstView(*object, view, frame, features, mount_pose);
+      CreditAgreement(expectation.T_camera_object, &track);
+      if (IsGood(frame, track)) return track;
+    }
+    if (!mount_pose) return std::nullopt;
+    std::optional<Track> track = tracker.At(*object, frame, features, *mount_pose, true, mount_pose);
+    if (static_cast<int>(track->matches.size()) >= params.recogniser.min_inliers && IsGood(frame, track)) return track;
+    return std::nullopt;
+  }
+
+  // By the whole model, anywhere in the image.
+  std::optional<Track> Relocalise(const rgbd::Frame& frame) {
+    const features::Features features = CurrentRecogniser().Extract(frame);
+    const auto detections = CurrentRecogniser().Recognise(frame, features);
+    if (detections.empty()) return std::nullopt;
+    std::optional<Track> track = tracker.At(*object, frame, features, detections.front().T_camera_object, true, MountPose(frame));
+    CreditAgreement(MountPose(frame), &track);
     return track;
+  }
+
+  std::optional<Found> Find(const rgbd::Frame& frame) {
+    const auto expectation = Expected(frame);
+    if (expectation && reference_view >= 0) {
+      if (auto track = Follow(frame, *expectation)) return Found{std::move(*track), true};
+    }
+    if (auto track = Relocalise(frame)) return Found{std::move(*track), false};
+    return std::nullopt;
+  }
+
+  // --- Surely tracking, or not ---
+
+  // The state after the object was found.
+  State StateOf(const rgbd::Frame& frame, const Found& found) {
+    if (state == State::kTracking && found.followed) return State::kTracking;
+    const auto mount_pose = MountPose(frame);
+    const bool sure = found.track.probability >= params.sure_probability ||
+                      (mount_pose && tracker.Agree(found.track.T_camera_object, *mount_pose));
+    confirmations = found.followed ? confirmations + 1 : 0;
+    return sure || confirmations >= params.confirm_frames ? State::kTracking : State::kRelocalising;
+  }
+
+  LearnerResult Lose(LearnerResult result, const std::string& note) {
+    state = result.state = State::kLost;
+    history.reset();
+    result.note = note;
+    return result;
+  }
+
+  // Whether the depth image looks through most of the surface that should be seen where the mount says the object is.
+  bool IsGone(const rgbd::Frame& frame, const geometry::Rigid& T_camera_object) const {
+    constexpr int kMinSamples = 50;
+    constexpr double kBehind_m = 0.03;
+    int seen = 0, behind = 0;
+    for (const int view : model::NearestViews(*object, T_camera_object, params.surface_views)) {
+      for (const pose::SurfacePoint& sample : SurfaceOfView(object->views[view], params.surface_samples / params.surface_views)) {
+        const Eigen::Vector3d point = T_camera_object * sample.point;
+        if ((T_camera_object.linear() * sample.normal).dot(point.normalized()) > -0.2) continue;
+        const auto pixel = frame.camera.Project(point);
+        const auto depth = pixel ? rgbd::DepthAt(frame, *pixel, 1) : std::nullopt;
+        if (!depth) continue;
+        ++seen;
+        behind += *depth > point.z() + kBehind_m;
+      }
+    }
+    return seen >= kMinSamples && 2 * behind > seen;
+  }
+
+  // The object was found where, by the mount, it is not. Seen gone from its place and found in one other place again and again, it
+  // was moved.
+  bool WasMoved(const rgbd::Frame& frame, const Track& track) {
+    if (track.probability < params.min_track_probability || !IsGone(frame, *MountPose(frame))) {
+      elsewhere = 0;
+      return false;
+    }
+    const geometry::Rigid T_world_found = *frame.T_world_camera * track.T_camera_object;
+    elsewhere = T_world_elsewhere && tracker.Agree(T_world_found, *T_world_elsewhere) ? elsewhere + 1 : 1;
+    T_world_elsewhere = T_world_found;
+    if (elsewhere < params.moved_frames) return false;
+    T_world_object = T_world_found;
+    elsewhere = 0;
+    return true;
   }
 
   // --- New views ---
@@ -290,31 +313,43 @@ struct Learner::Impl {
     return "";
   }
 
-  LearnerResult Continue(const rgbd::Frame& frame, const std::optional<geometry::Rigid>& known_pose) {
-    LearnerResult result;
-    std::optional<Track> track = known_pose ? Judge(frame, recogniser.Extract(frame), *known_pose, false) : Find(frame);
-    const bool contradicted = track && !known_pose && ContradictsMount(frame, track->T_camera_object);
-    if (track) {
-      result.confidence = track->confidence;
-      result.probability = track->probability;
-      result.inliers = static_cast<int>(track->matches.size());
+  // Follows the object through a frame whose pose was found.
+  LearnerResult Advance(const rgbd::Frame& frame, const Track& track, LearnerResult result, bool pose_is_known) {
+    Remember(frame, track.T_camera_object, Predicted(frame));
+    if (!T_world_object && frame.T_world_camera && state == State::kTracking) {
+      T_world_object = *frame.T_world_camera * track.T_camera_object;
     }
-    if (!track || contradicted || (!known_pose && track->probability < kSeen)) {
-      state = result.state = state == State::kTracking ? State::kRelocalising : State::kLost;
-      last_pose.reset();
-      result.note = contradicted ? "the track contradicts the mount's pose" : "the object was not found";
-      return result;
-    }
-    state = result.state = State::kTracking;
-    last_pose = track->T_camera_object;
-    if (!T_world_object && frame.T_world_camera) T_world_object = *frame.T_world_camera * track->T_camera_object;
-    result.T_camera_object = track->T_camera_object;
-    result.note = AddView(frame, *track, known_pose.has_value());
+    result.T_camera_object = track.T_camera_object;
+    result.note = state == State::kTracking ? AddView(frame, track, pose_is_known) : "found again, not yet surely";
     result.view_added = result.note.empty();
-    reference_view = result.view_added ? static_cast<int>(object->views.size()) - 1
-                                       : (track->confidence.view >= 0 ? track->confidence.view : reference_view);
+    if (result.view_added) {
+      reference_view = static_cast<int>(object->views.size()) - 1;
+    } else if (track.confidence.view >= 0) {
+      reference_view = track.confidence.view;  // The view that explains the frame best.
+    }
     result.reference_view = reference_view;
     return result;
+  }
+
+  LearnerResult Continue(const rgbd::Frame& frame, const std::optional<geometry::Rigid>& known_pose) {
+    LearnerResult result;
+    std::optional<Found> found;
+    if (known_pose) {
+      found = Found{tracker.At(*object, frame, CurrentRecogniser().Extract(frame), *known_pose, false, std::nullopt), true};
+    } else {
+      found = Find(frame);
+    }
+    if (!found) return Lose(result, "the object was not found");
+    const Track& track = found->track;
+    result.confidence = track.confidence;
+    result.probability = track.probability;
+    result.inliers = static_cast<int>(track.matches.size());
+    if (!known_pose && ContradictsMount(frame, track.T_camera_object) && !WasMoved(frame, track)) {
+      return Lose(result, "the track contradicts the mount's pose");
+    }
+    if (!known_pose && track.probability < kSeen) return Lose(result, "the object was not found");
+    state = result.state = known_pose ? State::kTracking : StateOf(frame, *found);
+    return Advance(frame, track, result, known_pose.has_value());
   }
 };
 
@@ -323,7 +358,7 @@ Learner::Learner(const LearnerParams& params, const std::string& name, std::shar
   impl_ = std::make_unique<Impl>(params, name);
   if (!known) return;
   impl_->Adopt(*known);
-  impl_->state = State::kRelocalising;
+  impl_->state = State::kLost;
 }
 Learner::~Learner() = default;
 Learner::Learner(Learner&&) noexcept = default;

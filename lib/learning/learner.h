@@ -7,36 +7,16 @@
 #include <string>
 #include <vector>
 
-#include "recognition/recogniser.h"
-#include "segmentation/clusters.h"
-#include "segmentation/plane.h"
+#include "learning/params.h"
 
 namespace vantage::learning {
 
-struct LearnerParams {
-  segmentation::PlaneParams plane;
-  segmentation::ClusterParams clusters;
-  recognition::RecogniserParams recogniser;
-  double new_view_confidence = 0.6;    // A new view is added when c falls below; (0, 1).
-  double min_track_probability = 0.7;  // ...but only with p(o|c) at least this; (0, 1).
-  int min_view_points = 20;            // A view needs so many interest points with depth; >= 4.
-  double min_view_angle_deg =
-      10.0;  // A new view differs from every other by so much in direction (or by a third of an octave in distance); >= 0.
-  // Where the mount's pose is known:
-  bool require_mount_agreement = true;    // A track that contradicts it by more than this is not trusted.
-  double max_mount_translation_m = 0.03;  // > 0.
-  double max_mount_rotation_deg = 6.0;    // > 0.
-  double mount_sigma_m = 0.003;           // How well it knows where the camera is: a pose that agrees is drawn to it; > 0.
-  double mount_sigma_deg = 0.3;           // > 0.
-  double agreement_prior = 0.9;           // p(o) of a pose found without it that agrees with it; [1/2, 1).
-  int surface_samples = 1000;             // Points of the learned surface that are drawn to the depth image; 0 = none.
-  int surface_views = 3;                  // ...taken from so many nearest views; >= 1.
-  double roi_margin = 0.25;  // Interest points are sought this share of the object's size around where it is expected; >= 0.
-
-  void Check() const;  // Throws std::invalid_argument naming the field.
+enum class State {
+  kSearching,     // There is no model yet: a cluster to begin with is sought.
+  kTracking,      // Surely on the object. Only here is anything learned.
+  kLost,          // Not found in the last frame; recognition seeks it in the whole image.
+  kRelocalising,  // Found again, not yet surely: the following frames have to confirm it.
 };
-
-enum class State { kSearching, kTracking, kLost, kRelocalising };
 std::string ToString(State state);
 
 // What one frame came to.

@@ -81,15 +81,20 @@ void Fields(Visitor& visit, learning::LearnerParams& params) {
   visit("min_track_probability", params.min_track_probability);
   visit("min_view_points", params.min_view_points);
   visit("min_view_angle_deg", params.min_view_angle_deg);
+  visit("neighbour_views", params.neighbour_views);
+  visit("roi_margin", params.roi_margin);
+  visit("min_roi_margin_px", params.min_roi_margin_px);
+  visit("surface_samples", params.surface_samples);
+  visit("surface_views", params.surface_views);
+  visit("agreement_prior", params.agreement_prior);
+  visit("sure_probability", params.sure_probability);
+  visit("confirm_frames", params.confirm_frames);
+  visit("moved_frames", params.moved_frames);
+  visit("require_mount_agreement", params.require_mount_agreement);
   visit("max_mount_translation_m", params.max_mount_translation_m);
   visit("max_mount_rotation_deg", params.max_mount_rotation_deg);
   visit("mount_sigma_m", params.mount_sigma_m);
   visit("mount_sigma_deg", params.mount_sigma_deg);
-  visit("agreement_prior", params.agreement_prior);
-  visit("require_mount_agreement", params.require_mount_agreement);
-  visit("surface_samples", params.surface_samples);
-  visit("surface_views", params.surface_views);
-  visit("roi_margin", params.roi_margin);
 }
 
 template <typename Visitor>

@@ -1,0 +1,41 @@
+// Every threshold of the online learner, in one place; the paper's values where it names one.
+#pragma once
+
+#include "recognition/recogniser.h"
+#include "segmentation/clusters.h"
+#include "segmentation/plane.h"
+
+namespace vantage::learning {
+
+struct LearnerParams {
+  segmentation::PlaneParams plane;
+  segmentation::ClusterParams clusters;
+  recognition::RecogniserParams recogniser;
+  // New views:
+  double new_view_confidence = 0.6;    // A new view is added when c falls below; (0, 1).
+  double min_track_probability = 0.7;  // ...but only with p(o|c) at least this; (0, 1).
+  int min_view_points = 20;            // A view needs so many interest points with depth; >= 4.
+  double min_view_angle_deg =
+      10.0;  // A new view differs from every other by so much in direction (or by a third of an octave in distance); >= 0.
+  // Tracking:
+  int neighbour_views = 2;          // Tried beside the reference view when the object is not found against it; >= 0.
+  double roi_margin = 0.25;         // Interest points are sought this share of the object's size around where it was; >= 0...
+  double min_roi_margin_px = 10.0;  // ...or this far (and thrice the last error) around where its motion leads; >= 0.
+  int surface_samples = 1000;       // Points of the learned surface that are drawn to the depth image; 0 = none.
+  int surface_views = 3;            // ...taken from so many nearest views; >= 1.
+  double agreement_prior = 0.9;     // p(o) of a pose found without the mount (or the last frames) that agrees with it; [1/2, 1).
+  // Losing and finding again:
+  double sure_probability = 0.9;  // An object found again with p(o|c) at least this is tracked at once; (0, 1).
+  int confirm_frames = 3;         // ...with less only after so many more frames; nothing is learned meanwhile; >= 0.
+  int moved_frames = 5;           // An object seen gone from its place and found in one other place so often was moved; >= 1.
+  // Where the mount's pose is known:
+  bool require_mount_agreement = true;    // A track that contradicts it by more than this is not trusted.
+  double max_mount_translation_m = 0.03;  // > 0.
+  double max_mount_rotation_deg = 6.0;    // > 0.
+  double mount_sigma_m = 0.003;           // How well it knows where the camera is: a pose that agrees is drawn to it; > 0.
+  double mount_sigma_deg = 0.3;           // > 0.
+
+  void Check() const;  // Throws std::invalid_argument naming the field.
+};
+
+}  // namespace vantage::learning

@@ -1,0 +1,143 @@
+#include "learning/tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "learning/keyframe.h"
+
+namespace vantage::learning {
+namespace {
+
+// The object's outline in the image: the convex hull of its projected points.
+std::vector<cv::Point> Outline(const model::ObjectModel& object, const geometry::PinholeCamera& camera,
+                               const geometry::Rigid& T_camera_object) {
+  std::vector<cv::Point> pixels, hull;
+  for (const model::ModelPoint& point : object.points) {
+    const auto pixel = camera.Project(T_camera_object * point.position);
+    // Far outside, whole pixels overflow.
+    if (pixel && pixel->cwiseAbs().maxCoeff() < 1e5) pixels.emplace_back(std::lround(pixel->x()), std::lround(pixel->y()));
+  }
+  if (!pixels.empty()) cv::convexHull(pixels, hull);
+  return hull;
+}
+
+// The hull and everything at most `margin` pixels around it, 255 in the image.
+cv::Mat Widened(const std::vector<cv::Point>& hull, int margin, const geometry::PinholeCamera& camera) {
+  cv::Mat mask = cv::Mat::zeros(camera.height, camera.width, CV_8UC1);
+  cv::fillConvexPoly(mask, hull, 255);
+  const int thickness = std::clamp(2 * margin, 1, 32767);
+  cv::polylines(mask, hull, true, 255, thickness);
+  return mask;
+}
+
+std::vector<pose::SurfacePoint> SurfaceNear(const model::ObjectModel& object, const geometry::Rigid& T_camera_object, int views,
+                                            int samples) {
+  std::vector<pose::SurfacePoint> surface;
+  const std::vector<int> nearest = model::NearestViews(object, T_camera_object, views);
+  for (const int view : nearest) {
+    const auto part = SurfaceOfView(object.views[view], samples / static_cast<int>(nearest.size()));
+    surface.insert(surface.end(), part.begin(), part.end());
+  }
+  return surface;
+}
+
+}  // namespace
+
+features::Features Tracker::ExtractAround(const model::ObjectModel& object, const rgbd::Frame& frame,
+                                          const Expectation& expectation) const {
+  const std::vector<cv::Point> hull = Outline(object, frame.camera, expectation.T_camera_object);
+  if (hull.empty()) return {};
+  const cv::Mat mask = Widened(hull, static_cast<int>(std::lround(expectation.margin_px)), frame.camera);
+  if (cv::countNonZero(mask) == 0) return {};
+  return features::Extract(rgbd::Gray(frame), mask, params_.recogniser.features);
+}
+
+bool Tracker::Agree(const geometry::Rigid& T_camera_object_a, const geometry::Rigid& T_camera_object_b) const {
+  const geometry::PoseDifference difference = geometry::Difference(T_camera_object_a, T_camera_object_b);
+  return difference.translation_m <= params_.max_mount_translation_m &&
+         difference.rotation_rad <= params_.max_mount_rotation_deg * M_PI / 180.0;
+}
+
+geometry::Rigid Tracker::Refined(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
+                                 const recognition::GuidedPose& guided, const std::optional<geometry::Rigid>& mount_pose) const {
+  std::vector<pose::Match2d3d> matches;
+  std::vector<int> all;
+  for (const recognition::GuidedMatch& match : guided.matches) {
+    const cv::Point2f& pixel = features.keypoints[match.keypoint].pt;
+    all.push_back(static_cast<int>(matches.size()));
+    matches.push_back({{pixel.x, pixel.y}, object.points[match.point].position, 0.0});
+  }
+  std::vector<pose::SurfacePoint> surface;
+  if (!frame.depth.empty() && params_.surface_samples > 0) {
+    surface = SurfaceNear(object, guided.T_camera_object, params_.surface_views, params_.surface_samples);
+  }
+  std::optional<pose::PosePrior> prior;
+  if (mount_pose && Agree(guided.T_camera_object, *mount_pose)) {
+    prior = pose::PosePrior{*mount_pose, params_.mount_sigma_m, params_.mount_sigma_deg * M_PI / 180.0};
+  }
+  if (surface.empty() && !prior) return guided.T_camera_object;
+  return pose::RefinePoseOnSurface(matches, all, surface, frame, prior, guided.T_camera_object,
+                                   0.5 * params_.recogniser.ransac.inlier_px);
+}
+
+Track Tracker::At(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
+                  const geometry::Rigid& T_camera_object, bool refine, const std::optional<geometry::Rigid>& mount_pose) const {
+  const recognition::RecogniserParams& recogniser = params_.recogniser;
+  recognition::GuidedParams guided_params;
+  guided_params.radius_px = recogniser.guided_radius_px;
+  guided_params.max_distance = recogniser.guided_max_distance;
+  guided_params.inlier_px = recogniser.ransac.inlier_px;
+  rgbd::Frame query = frame;
+  if (!recogniser.use_query_depth) query.depth = cv::Mat();
+  const model::KeypointGrid grid(features.keypoints, frame.camera.width, frame.camera.height);
+  const auto guided = recognition::MatchGuided(object, T_camera_object, query, features, grid, guided_params);
+  Track track;
+  track.matches = guided.matches;
+  track.T_camera_object = refine ? Refined(object, query, features, guided, mount_pose) : T_camera_object;
+  track.confidence = model::ObjectConfidence(object, track.T_camera_object, query, grid, recogniser.confidence);
+  track.probability = object.measures.observed.Probability(track.confidence.value);
+  track.features = features;
+  return track;
+}
+
+std::optional<Track> Tracker::AgainstView(const model::ObjectModel& object, int view, const rgbd::Frame& frame,
+                                          const features::Features& features,
+                                          const std::optional<geometry::Rigid>& mount_pose) const {
+  const recognition::RecogniserParams& recogniser = params_.recogniser;
+  const model::View& reference = object.views[view];
+  std::vector<pose::Match2d3d> matches;
+  for (const features::Match& match :
+       features::MatchRatio(features.descriptors, reference.features.descriptors, recogniser.max_ratio)) {
+    const cv::Point2f& pixel = features.keypoints[match.query].pt;
+    matches.push_back({{pixel.x, pixel.y}, object.points[reference.points[match.train]].position});
+  }
+  const auto estimate =
+      pose::EstimatePose(matches, frame.camera, recogniser.use_query_depth ? &frame : nullptr, recogniser.ransac, recogniser.seed);
+  if (!estimate || static_cast<int>(estimate->inliers.size()) < recogniser.min_inliers) return std::nullopt;
+  return At(object, frame, features, estimate->T_camera_object, true, mount_pose);
+}
+
+double LargestShift(const model::ObjectModel& object, const geometry::PinholeCamera& camera,
+                    const geometry::Rigid& T_camera_object_a, const geometry::Rigid& T_camera_object_b) {
+  double largest = 0.0;
+  for (const model::ModelPoint& point : object.points) {
+    const auto a = camera.Project(T_camera_object_a * point.position);
+    const auto b = camera.Project(T_camera_object_b * point.position);
+    if (a && b) largest = std::max(largest, (*a - *b).norm());
+  }
+  return largest;
+}
+
+geometry::Rigid Continued(const geometry::Rigid& before, const geometry::Rigid& last, double last_interval_s, double ahead_s) {
+  if (!(last_interval_s > 0.0) || !(ahead_s > 0.0)) return last;
+  const double share = std::min(3.0, ahead_s / last_interval_s);
+  const geometry::Rigid motion = before.inverse() * last;  // In the object's frame: small, whatever the distance.
+  const Eigen::AngleAxisd turn(motion.linear());
+  geometry::Rigid step = geometry::Rigid::Identity();
+  step.linear() = Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
+  step.translation() = share * motion.translation();
+  return last * step;
+}
+
+}  // namespace vantage::learning

@@ -1,0 +1,65 @@
+// Follows one known object: interest points where it can be, the pose against a reference view, and what speaks for it
+// (section III).
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "learning/params.h"
+#include "model/confidence.h"
+#include "model/object_model.h"
+#include "recognition/guided.h"
+
+namespace vantage::learning {
+
+// A pose of the object in a frame, with what speaks for it.
+struct Track {
+  geometry::Rigid T_camera_object = geometry::Rigid::Identity();
+  features::Features features;  // Of the frame, where the object was sought.
+  std::vector<recognition::GuidedMatch> matches;
+  model::Confidence confidence;
+  double probability = 0.0;  // p(o|c).
+};
+
+// Where the object can be in a frame that was not looked at yet.
+struct Expectation {
+  geometry::Rigid T_camera_object = geometry::Rigid::Identity();
+  double margin_px = 0.0;  // Around its projection.
+};
+
+class Tracker {
+ public:
+  explicit Tracker(const LearnerParams& params) : params_(params) {}
+
+  // The frame's features inside the expected outline. Empty where that is outside the image.
+  features::Features ExtractAround(const model::ObjectModel& object, const rgbd::Frame& frame,
+                                   const Expectation& expectation) const;
+
+  // Against one view alone, as in the paper: descriptors matched, P3P inside RANSAC, then At() its pose. nullopt where too few
+  // matches agree. `mount_pose`: T_camera_object as the mount says, where it says; a pose that agrees with it is drawn to it.
+  std::optional<Track> AgainstView(const model::ObjectModel& object, int view, const rgbd::Frame& frame,
+                                   const features::Features& features, const std::optional<geometry::Rigid>& mount_pose) const;
+
+  // Guided matches, confidence and p(o|c) at a pose; `refine` lets the pose follow the matches, the depth image and the mount.
+  Track At(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
+           const geometry::Rigid& T_camera_object, bool refine, const std::optional<geometry::Rigid>& mount_pose) const;
+
+  bool Agree(const geometry::Rigid& T_camera_object_a, const geometry::Rigid& T_camera_object_b) const;
+
+ private:
+  geometry::Rigid Refined(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
+                          const recognition::GuidedPose& guided, const std::optional<geometry::Rigid>& mount_pose) const;
+
+  LearnerParams params_;
+};
+
+// The largest distance, in pixels, by which any of the object's points moves between the two poses; 0 where none is in front of
+// the camera.
+double LargestShift(const model::ObjectModel& object, const geometry::PinholeCamera& camera,
+                    const geometry::Rigid& T_camera_object_a, const geometry::Rigid& T_camera_object_b);
+
+// Where a steady motion leads: `before` and `last` are T_camera_object `last_interval_s` apart; the result is `ahead_s` after
+// `last`. No more than three intervals ahead.
+geometry::Rigid Continued(const geometry::Rigid& before, const geometry::Rigid& last, double last_interval_s, double ahead_s);
+
+}  // namespace vantage::learning
