@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <opencv2/imgproc.hpp>
 
 #include "learning/keyframe.h"
@@ -52,6 +53,8 @@ struct Learner::Impl {
   Tracker tracker;
   std::shared_ptr<const model::ObjectModel> object;
   recognition::Recogniser recogniser;
+  recognition::Recogniser others;  // Objects met before, of which this may be one.
+  std::map<std::string, std::shared_ptr<const model::ObjectModel>> other_objects;
   bool recogniser_is_current = false;  // It is told of a changed model only when it is needed.
   State state = State::kSearching;
   int confirmations = 0;  // Frames that agreed since the object was found again.
@@ -64,7 +67,7 @@ struct Learner::Impl {
   std::vector<segmentation::Cluster> clusters;
 
   Impl(const LearnerParams& p, const std::string& object_name)
-      : params(p), name(object_name), tracker(p), recogniser(p.recogniser) {}
+      : params(p), name(object_name), tracker(p), recogniser(p.recogniser), others(p.recogniser) {}
 
   void Adopt(model::ObjectModel changed) {
     object = std::make_shared<const model::ObjectModel>(std::move(changed));
@@ -98,6 +101,7 @@ struct Learner::Impl {
       result.note = clusters.empty() ? "nothing stands on the table" : "no cluster at the target";
       return result;
     }
+    if (!known_pose && ContinuesAnother(frame, index)) return Continue(frame, std::nullopt);
     const cv::Mat& mask = clusters[index].mask;
     const geometry::Rigid T_camera_object = known_pose.value_or(FirstPose(frame, *plane, clusters[index]));
     const features::Features features = features::Extract(rgbd::Gray(frame), mask, params.recogniser.features);
@@ -120,6 +124,21 @@ struct Learner::Impl {
     result.reference_view = 0;
     result.view_added = true;
     return result;
+  }
+
+  // Whether what this cluster shows was met before; then its model is adopted.
+  bool ContinuesAnother(const rgbd::Frame& frame, int cluster) {
+    if (other_objects.empty()) return false;
+    for (const recognition::Detection& detection : others.Recognise(frame, others.Extract(frame))) {
+      const auto& other = other_objects.at(detection.object);
+      if (detection.probability < params.sure_probability) continue;
+      if (ClusterOfObject(clusters, *other, detection.T_camera_object, frame.camera) != cluster) continue;
+      name = detection.object;
+      Adopt(*other);
+      state = State::kLost;
+      return true;
+    }
+    return false;
   }
 
   // --- Where the object is expected ---
@@ -368,6 +387,15 @@ LearnerResult Learner::Process(const rgbd::Frame& frame, const Target& target, c
   rgbd::CheckFrame(frame);
   return impl_->object ? impl_->Continue(frame, known_pose) : impl_->Start(frame, target, known_pose);
 }
+
+void Learner::SetOthers(const std::vector<std::shared_ptr<const model::ObjectModel>>& others) {
+  for (const auto& other : others) {
+    impl_->others.Set(other);
+    impl_->other_objects[other->name] = other;
+  }
+}
+
+const std::string& Learner::name() const { return impl_->name; }
 
 std::shared_ptr<const model::ObjectModel> Learner::object() const { return impl_->object; }
 

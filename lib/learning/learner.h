@@ -28,7 +28,8 @@ struct LearnerResult {
   int reference_view = -1;   // Index of the tracked view.
   int inliers = 0;
   bool view_added = false;
-  std::string note;  // Why nothing was learned, in a few words; empty where there is nothing to say.
+  bool refined = false;  // A refinement took effect in this frame: points and poses of the model have moved.
+  std::string note;      // Why nothing was learned, in a few words; empty where there is nothing to say.
 };
 
 // Where to start: the cluster that holds this pixel; without it, the one nearest to the image centre.
@@ -38,7 +39,7 @@ struct Target {
 
 class Learner {
  public:
-  // `name`: of a new object. `known`: go on with this model (it starts by relocalising).
+  // `name`: of a new object. `known`: go on with this model (it is lost at first, and sought by recognition).
   Learner(const LearnerParams& params, const std::string& name, std::shared_ptr<const model::ObjectModel> known = nullptr);
   ~Learner();
   Learner(Learner&&) noexcept;
@@ -49,6 +50,11 @@ class Learner {
   LearnerResult Process(const rgbd::Frame& frame, const Target& target = {},
                         const std::optional<geometry::Rigid>& known_pose = std::nullopt);
 
+  // Objects met before. Where the one to begin with turns out to be one of them its model is continued, under its name, instead of
+  // a twin. Throws as recognition::Recogniser::Set.
+  void SetOthers(const std::vector<std::shared_ptr<const model::ObjectModel>>& others);
+
+  const std::string& name() const;
   // The model so far; null before the first view. A new object is made for every change: what was handed out stays as it was.
   std::shared_ptr<const model::ObjectModel> object() const;
   // The measures p(o|c) is judged by from now on.

@@ -38,10 +38,10 @@ class Store {
   // Every call is one transaction: durable when it returns (WAL, synchronous FULL), or nothing is changed. Throw std::runtime_error
   // (disk full, read-only, locked longer than 5 s).
   void SaveObject(const ObjectModel& model);  // Replaces the whole object, completeness included.
-  // Appends that view (an index), the points it added, and moves what refinement moved: points, poses and links of the others.
-  // Makes the object where there is none; measures stay as they were saved. Throws std::invalid_argument where the store does not
-  // hold just the other views.
-  void AddView(const ObjectModel& model, int view);
+  // Brings what is stored to this state of the object, without writing images again: new views are added, those it has no more are
+  // removed, poses, points, links and features of the others follow. Makes the object where there is none; measures stay as they
+  // were saved. Throws std::invalid_argument where a view is stored under the same id with another time: that is another object.
+  void Update(const ObjectModel& model);
   void SaveMeasures(const std::string& name, const measures::Measures& measures, double completeness);
   void Remove(const std::string& name);
 

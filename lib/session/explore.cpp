@@ -89,7 +89,7 @@ class Run {
   void LearnedView(const rgbd::Frame& frame) {
     const auto object = learner_.object();
     const int newest = static_cast<int>(object->views.size()) - 1;
-    if (store_) store_->AddView(*object, newest);
+    if (store_) store_->Update(*object);
     AddBackground(frame);
     assessment::TrialParams trials = params_.trials;
     trials.seed += params_.seed;

@@ -111,8 +111,7 @@ void AssessorNode::OnTrack(const track_t& message) {
   current_ = track->object;
   Object& object = objects_[current_];
   // The learner tells of a view before it is durable: only what was there before counts.
-  const int stored = track->views - (track->result.view_added ? 1 : 0);
-  object.views = std::max(object.views, stored);
+  object.views = track->views - (track->result.view_added ? 1 : 0);
   if (track->T_world_object) object.T_world_object = track->T_world_object;
 }
 
@@ -201,9 +200,9 @@ void AssessorNode::OnAssessment(const Assessment& assessment) {
   }
   object.measures = assessment.measures;
   object.assessed_views = assessment.assessed_views;
-  object.views = std::max(object.views, static_cast<int>(assessment.views.size()));
+  object.views = static_cast<int>(assessment.views.size());
   // Views may have come in meanwhile: theirs stay.
-  if (object.viewpoints.size() <= assessment.views.size()) {
+  if (assessment.utime >= object.utime) {
     object.viewpoints = assessment.views;
     object.utime = assessment.utime;
   }

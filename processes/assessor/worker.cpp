@@ -78,15 +78,21 @@ void Worker::Run() {
 }
 
 Worker::Known& Worker::Read(const std::string& object) {
-  Known& known = known_[object];
-  if (known.model && known.view_ids.size() < known.model->views.size()) return known;
   const model::Store store(params_.store, model::Store::Mode::kRead);
   auto model = store.Load(object);
   if (!model || model->views.empty()) throw std::runtime_error(params_.store + ": no views of '" + object + "'");
-  const auto same = [](int id, const model::View& view) { return id == view.id; };
-  const bool grown = known.view_ids.size() <= model->views.size() &&
-                     std::equal(known.view_ids.begin(), known.view_ids.end(), model->views.begin(), same);
-  if (!grown) known = Known();  // The object was learned anew.
+  Known& known = known_[object];
+  const auto time_of = [](const model::ObjectModel& of, int id) {
+    for (const model::View& view : of.views) {
+      if (view.id == id) return view.utime;
+    }
+    return std::int64_t{-1};
+  };
+  for (auto trials = known.trials.begin(); trials != known.trials.end();) {
+    // A view may have been merged with another; the same id at another time is an object learned anew.
+    const std::int64_t utime = time_of(*model, trials->first);
+    trials = utime >= 0 && utime == time_of(*known.model, trials->first) ? std::next(trials) : known.trials.erase(trials);
+  }
   known.model = std::make_shared<const model::ObjectModel>(std::move(*model));
   return known;
 }
@@ -94,25 +100,26 @@ Worker::Known& Worker::Read(const std::string& object) {
 Assessment Worker::Assess(const std::string& object, const std::optional<rgbd::Frame>& frame) {
   if (frame) AddBackground(*frame);
   Known& known = Read(object);
-  const int next = static_cast<int>(known.view_ids.size());
-  if (next < static_cast<int>(known.model->views.size())) {
-    std::vector<int> first_views(static_cast<std::size_t>(next) + 1);
+  const auto& views = known.model->views;
+  const auto next = std::find_if(views.begin(), views.end(), [&](const model::View& view) { return !known.trials.count(view.id); });
+  if (next != views.end()) {
+    std::vector<int> first_views(static_cast<std::size_t>(next - views.begin()) + 1);
     std::iota(first_views.begin(), first_views.end(), 0);
-    const auto trials = assessment::RunTrials(known.model->OnlyViews(first_views), next, backgrounds_, params_.recogniser,
-                                              params_.trials, [this](int done, int of) {
-                                                if (stop_) throw BrokenOff();
-                                                progress_ = static_cast<double>(done) / of;
-                                              });
-    known.trials.insert(known.trials.end(), trials.begin(), trials.end());
-    known.view_ids.push_back(known.model->views[static_cast<std::size_t>(next)].id);
+    known.trials[next->id] = assessment::RunTrials(known.model->OnlyViews(first_views), first_views.back(), backgrounds_,
+                                                   params_.recogniser, params_.trials, [this](int done, int of) {
+                                                     if (stop_) throw BrokenOff();
+                                                     progress_ = static_cast<double>(done) / of;
+                                                   });
   }
 
   Assessment result;
   result.utime = known.model->views.back().utime;
   result.views = known.model->viewpoints();
-  result.assessed_views = static_cast<int>(known.view_ids.size());
-  result.measures = assessment::FitMeasures(known.trials, params_.recogniser);
-  result.trials = static_cast<int>(known.trials.size());
+  result.assessed_views = static_cast<int>(known.trials.size());
+  std::vector<assessment::Trial> all;
+  for (const auto& [id, trials] : known.trials) all.insert(all.end(), trials.begin(), trials.end());
+  result.measures = assessment::FitMeasures(all, params_.recogniser);
+  result.trials = static_cast<int>(all.size());
   return result;
 }
 

@@ -35,7 +35,7 @@ struct Assessment {
   std::string error;                       // Empty where it worked; then:
   std::int64_t utime = 0;                  // Capture time of the newest view in the store.
   std::vector<measures::Viewpoint> views;  // In the store.
-  int assessed_views = 0;                  // The first so many of them have had their trials.
+  int assessed_views = 0;                  // So many of them have had their trials.
   measures::Measures measures;
   int trials = 0;  // All that the fit is made of.
 };
@@ -59,14 +59,13 @@ class Worker {
 
  private:
   struct Known {
-    std::shared_ptr<const model::ObjectModel> model;  // As last read from the store.
-    std::vector<int> view_ids;                        // That have had their trials.
-    std::vector<assessment::Trial> trials;
+    std::shared_ptr<const model::ObjectModel> model;       // As last read from the store.
+    std::map<int, std::vector<assessment::Trial>> trials;  // By the id of the view that was offered.
   };
 
   void Run();
   Assessment Assess(const std::string& object, const std::optional<rgbd::Frame>& frame);
-  // Reads the store where all views known were assessed.
+  // Reads the store; trials of views that are no more are forgotten.
   Known& Read(const std::string& object);
   void AddBackground(const rgbd::Frame& frame);
 

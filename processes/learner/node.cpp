@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
+#include <sstream>
 #include <stdexcept>
 #include <vantage/mount_state_t.hpp>
 #include <vantage/operator_command_t.hpp>
@@ -54,9 +56,7 @@ LearnerNode::LearnerNode(messaging::Bus& bus, const LearnerNodeParams& params)
       store_(params.store, model::Store::Mode::kWrite),
       frames_(bus),
       next_scene_us_(bus.now_us()) {
-  const auto known = LoadKnown(store_, params_.object);
-  if (known) stored_views_ = known->views.size();
-  learner_ = std::make_unique<learning::Learner>(params_.learner, params_.object, known);
+  Begin(params_.object);
   Subscribe<measures_t>(messaging::kAssessorMeasures, [this](const measures_t& message) {
     const auto measures = messaging::FromMessage(message);
     if (!measures) return Refuse(messaging::kAssessorMeasures, measures.error);
@@ -69,7 +69,46 @@ LearnerNode::LearnerNode(messaging::Bus& bus, const LearnerNodeParams& params)
     if (!message.process.empty() && message.process != process()) return;
     if (message.command == "pause") paused_ = true;
     if (message.command == "resume") paused_ = false;
+    if (message.command == "learn") OnLearn(message.argument);
   });
+}
+
+void LearnerNode::Begin(const std::string& object) {
+  const auto known = LoadKnown(store_, object);
+  learner_ = std::make_unique<learning::Learner>(params_.learner, object, known);
+  announced_view_ = known ? known->views.back().id : -1;
+  last_ = {};
+  unsaved_ = false;
+  saved_measures_.reset();
+  if (known) return;
+  std::vector<std::shared_ptr<const model::ObjectModel>> others;
+  for (const auto& summary : store_.List()) {
+    try {
+      if (auto other = LoadKnown(store_, summary.name)) others.push_back(std::move(other));
+    } catch (const std::runtime_error& error) {
+      NoteError(error.what());  // One that is damaged is left out.
+    }
+  }
+  learner_->SetOthers(others);
+}
+
+void LearnerNode::OnLearn(const std::string& argument) {
+  std::string object = params_.object;
+  std::optional<Eigen::Vector2d> pixel;
+  std::istringstream words(argument);
+  for (std::string word; words >> word;) {
+    double u = 0.0, v = 0.0;
+    char end = 0;
+    if (std::sscanf(word.c_str(), "%lf,%lf%c", &u, &v, &end) == 2) {
+      pixel = Eigen::Vector2d(u, v);
+    } else {
+      object = word;
+    }
+  }
+  StoreViews();
+  Begin(object);
+  params_.target_pixel.clear();
+  if (pixel) params_.target_pixel = {pixel->x(), pixel->y()};
 }
 
 std::int64_t LearnerNode::NextStep_us() const {
@@ -79,11 +118,11 @@ std::int64_t LearnerNode::NextStep_us() const {
 std::string LearnerNode::State() const { return paused_ ? "paused" : learning::ToString(last_.result.state); }
 
 std::string LearnerNode::Detail() const {
-  return params_.object + ", " + std::to_string(stored_views_) + " views in " + params_.store;
+  return learner_->name() + ", " + std::to_string(last_.views) + " views in " + params_.store;
 }
 
 void LearnerNode::OnMeasures(const messaging::ObjectMeasures& measures) {
-  if (measures.object != params_.object || stored_views_ == 0) return;
+  if (measures.object != learner_->name() || announced_view_ < 0) return;
   if (saved_measures_ && Same(*saved_measures_, measures)) return;
   if (!measures.measures.fingerprint.empty() && measures.measures.fingerprint != params_.learner.recogniser.Fingerprint()) {
     return Refuse(messaging::kAssessorMeasures,
@@ -125,26 +164,26 @@ void LearnerNode::Process(const messaging::ReceivedFrame& received) {
 
   last_.utime = received.frame.utime;
   last_.sequence = received.sequence;
-  last_.object = params_.object;
+  last_.object = learner_->name();
   last_.T_world_object = learner_->T_world_object();
   const auto object = learner_->object();
   last_.views = object ? static_cast<int>(object->views.size()) : 0;
   last_.points = object ? static_cast<int>(object->points.size()) : 0;
   last_.process_ms = elapsed.count();
+  unsaved_ |= last_.result.view_added || last_.result.refined;
   NoteScene(received.frame, last_.result.view_added);
   bus_.Publish(messaging::kLearnerTrack, messaging::ToMessage(last_));
   StoreViews();
 }
 
 void LearnerNode::StoreViews() {
+  if (!unsaved_) return;  // Where writing fails it is tried again with the next frame.
   const auto object = learner_->object();
-  if (!object || object->views.size() <= stored_views_) return;
-  if (object->views.size() == stored_views_ + 1) {
-    store_.AddView(*object, static_cast<int>(stored_views_));
-  } else {
-    store_.SaveObject(*object);  // Writing failed before: all that is missing at once.
-  }
-  stored_views_ = object->views.size();
+  store_.Update(*object);
+  unsaved_ = false;
+  const int newest = object->views.back().id;
+  if (newest == announced_view_) return;
+  announced_view_ = newest;
   Count("views");
   bus_.Publish(messaging::kLearnerView, messaging::ToMessage(messaging::NewestView(*object, params_.store)));
 }
@@ -169,7 +208,7 @@ void LearnerNode::PublishScene() {
   if (scene_.empty()) return;
   messaging::Scene scene;
   scene.utime = scene_utime_;
-  scene.object = params_.object;
+  scene.object = learner_->name();
   scene.plane = scene_.plane_in_world();
   scene.hulls = scene_.hulls();
   bus_.Publish(messaging::kLearnerScene, messaging::ToMessage(scene));

@@ -46,9 +46,12 @@ class LearnerNode : public messaging::Node {
   std::string Detail() const override;
 
  private:
+  // "[NAME] [U,V]": learns this object next, going on with what is stored under that name.
+  void OnLearn(const std::string& argument);
+  void Begin(const std::string& object);
   void OnMeasures(const messaging::ObjectMeasures& measures);
   void Process(const messaging::ReceivedFrame& received);
-  // Writes the views that are not in the store yet, and says so on LEARNER_VIEW.
+  // Writes what the store does not hold yet, and tells of a new view on LEARNER_VIEW.
   void StoreViews();
   void NoteScene(const rgbd::Frame& frame, bool view_added);
   void PublishScene();
@@ -57,7 +60,8 @@ class LearnerNode : public messaging::Node {
   model::Store store_;
   messaging::FrameReceiver frames_;
   std::unique_ptr<learning::Learner> learner_;
-  std::size_t stored_views_ = 0;
+  bool unsaved_ = false;     // The model has changed since it was written.
+  int announced_view_ = -1;  // Id of the newest view that was told of.
   SceneMap scene_;
   std::int64_t scene_utime_ = 0;
   std::int64_t next_scene_us_ = 0;

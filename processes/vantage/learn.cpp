@@ -52,7 +52,7 @@ class ViewKeeper {
     if (newest == 0) {
       store_->SaveObject(object);
     } else {
-      store_->AddView(object, newest);
+      store_->Update(object);
     }
   }
 

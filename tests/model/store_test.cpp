@@ -166,34 +166,44 @@ TEST_F(StoreTest, WhatIsSavedComesBackToTheLastBit) {
   EXPECT_EQ(list[0].utime, 1002);
 }
 
-TEST_F(StoreTest, AddViewAppendsAndMovesWhatRefinementMoved) {
+TEST_F(StoreTest, UpdateFollowsWhatRefinementMovedAndUpkeepDropped) {
   std::mt19937 random(kSeed);
   ObjectModel model = RandomModel("box", 0);
   Store store(file_, Store::Mode::kWrite);
   std::int64_t revision = 0;
-  for (int i = 0; i < 4; ++i) {
-    GrowModel(model, random);
-    model.views[0].T_camera_object.translation().x() += 0.01;
-    model.views[0].points[3] = static_cast<int>(model.points.size()) - 1;  // A link by loop closure.
-    store.AddView(model, i);
+  const auto expect_stored = [&] {
+    store.Update(model);
     ExpectSame(store.Load("box").value(), model);
     const std::int64_t now = store.List().at(0).revision;
     EXPECT_GT(now, revision);
     revision = now;
+  };
+  for (int i = 0; i < 4; ++i) {
+    GrowModel(model, random);
+    model.views[0].T_camera_object.translation().x() += 0.01;
+    model.views[0].points[3] = static_cast<int>(model.points.size()) - 1;  // A link by loop closure.
+    expect_stored();
   }
+  View& thinned = model.views[2];
+  thinned.features = features::Select(thinned.features, {0, 5, 7});
+  thinned.points = {thinned.points[0], thinned.points[5], thinned.points[7]};
+  model.views.erase(model.views.begin() + 1);
+  expect_stored();
+  GrowModel(model, random);
+  GrowModel(model, random);
+  expect_stored();
 }
 
-TEST_F(StoreTest, AddViewThatDoesNotFitChangesNothing) {
+TEST_F(StoreTest, UpdateThatDoesNotFitChangesNothing) {
   Store store(file_, Store::Mode::kWrite);
   const ObjectModel model = RandomModel("box", 2);
   store.SaveObject(model);
-  EXPECT_TRUE(Contains(ErrorOf([&] { store.AddView(model, 1); }), "box")) << "a view that is stored already";
-  EXPECT_THROW(store.AddView(RandomModel("box", 4), 3), std::invalid_argument) << "view 2 was never stored";
-  EXPECT_THROW(store.AddView(RandomModel("box", 1), 0), std::exception);
-  EXPECT_THROW(store.AddView(model, 7), std::invalid_argument);
+  ObjectModel another = model;
+  another.views[1].utime += 1;
+  EXPECT_TRUE(Contains(ErrorOf([&] { store.Update(another); }), "another object"));
   ObjectModel wrong = RandomModel("box", 3);
   wrong.views[2].points[0] = 5000;
-  EXPECT_TRUE(Contains(ErrorOf([&] { store.AddView(wrong, 2); }), "view 2"));
+  EXPECT_TRUE(Contains(ErrorOf([&] { store.Update(wrong); }), "view 2"));
   ExpectSame(store.Load("box").value(), model);
 }
 
@@ -211,7 +221,7 @@ TEST_F(StoreTest, MeasuresCompletenessAndRemoval) {
   ExpectSame(store.Load("box").value(), model);
   std::mt19937 random(1);
   GrowModel(model, random);
-  store.AddView(model, 1);
+  store.Update(model);
   EXPECT_EQ(store.Completeness("box"), 0.625);
   ExpectSame(store.Load("box").value(), model);
   const std::int64_t last = store.List().at(0).revision;
@@ -239,7 +249,7 @@ TEST_F(StoreTest, AKilledWriterLeavesWholeViews) {
       Store store(file_, Store::Mode::kWrite);
       for (int i = 0; i < 500; ++i) {
         GrowModel(model, random);
-        store.AddView(model, i);
+        store.Update(model);
         if (::write(report[1], "v", 1) != 1) ::_exit(1);
       }
       ::_exit(0);
@@ -265,7 +275,7 @@ TEST_F(StoreTest, AKilledWriterLeavesWholeViews) {
     std::mt19937 random(1);
     GrowModel(more, random);
     Store store(file_, Store::Mode::kWrite);
-    store.AddView(more, static_cast<int>(loaded.views.size()));
+    store.Update(more);
     ExpectSame(store.Load("box").value(), more);
   }
 }
@@ -318,7 +328,7 @@ TEST_F(StoreTest, ReadersSeeWholeTransactionsWhileTheWriterWrites) {
   std::mt19937 random(kSeed);
   for (int i = 0; i < 25; ++i) {
     GrowModel(model, random);
-    store.AddView(model, i);
+    store.Update(model);
   }
   for (const pid_t reader : readers) {
     int status = 0;
