@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "learning/keyframe.h"
+#include "learning/refiner.h"
 #include "learning/tracker.h"
 
 namespace vantage::learning {
@@ -56,6 +57,9 @@ struct Learner::Impl {
   recognition::Recogniser others;  // Objects met before, of which this may be one.
   std::map<std::string, std::shared_ptr<const model::ObjectModel>> other_objects;
   bool recogniser_is_current = false;  // It is told of a changed model only when it is needed.
+  Refiner refiner;
+  std::vector<PointStatistics> statistics;  // One per model point.
+  std::int64_t frame_number = 0;
   State state = State::kSearching;
   int confirmations = 0;  // Frames that agreed since the object was found again.
   int reference_view = -1;
@@ -67,10 +71,11 @@ struct Learner::Impl {
   std::vector<segmentation::Cluster> clusters;
 
   Impl(const LearnerParams& p, const std::string& object_name)
-      : params(p), name(object_name), tracker(p), recogniser(p.recogniser), others(p.recogniser) {}
+      : params(p), name(object_name), tracker(p), recogniser(p.recogniser), others(p.recogniser), refiner(p) {}
 
   void Adopt(model::ObjectModel changed) {
     object = std::make_shared<const model::ObjectModel>(std::move(changed));
+    statistics.resize(object->points.size());
     recogniser_is_current = false;
   }
 
@@ -306,6 +311,66 @@ struct Learner::Impl {
     return true;
   }
 
+  // --- Refinement ---
+
+  // Where the mount says the object is in each view that was taken with the mount's pose known and agrees with it.
+  std::map<int, pose::PosePrior> MountPriors() const {
+    std::map<int, pose::PosePrior> priors;
+    for (const model::View& view : object->views) {
+      const auto mount_pose = MountPose(view.keyframe);
+      if (!mount_pose || !tracker.Agree(view.T_camera_object, *mount_pose)) continue;
+      priors[view.id] = {*mount_pose, params.mount_sigma_m, params.mount_sigma_deg * M_PI / 180.0};
+    }
+    return priors;
+  }
+
+  void StartRefinement() {
+    if (params.refine) refiner.StartIfDue(frame_number, object, statistics, MountPriors());
+  }
+
+  // The refined model, with what was learned since, in place of the one there is.
+  void TakeEffect(const Refinement& refinement) {
+    std::vector<int> new_index;
+    const int reference_id = reference_view >= 0 ? object->views[reference_view].id : -1;
+    model::ObjectModel rebased = Rebased(*refinement.base, refinement.changed, *object, &new_index);
+    std::vector<PointStatistics> moved(rebased.points.size());
+    for (size_t p = 0; p < new_index.size(); ++p) {
+      if (new_index[p] < 0) continue;
+      moved[new_index[p]].visible += statistics[p].visible;
+      moved[new_index[p]].seen += statistics[p].seen;
+    }
+    statistics = std::move(moved);
+    if (history && reference_id >= 0) {
+      // The object stays where it is in the image; its coordinates have changed.
+      const geometry::Rigid T_before_after = ChangeOf(*object, rebased, reference_id).inverse();
+      history->T_camera_object = history->T_camera_object * T_before_after;
+      if (history->before) history->before = *history->before * T_before_after;
+    }
+    Adopt(std::move(rebased));
+    reference_view = -1;
+    for (size_t v = 0; v < object->views.size(); ++v) {
+      if (object->views[v].id == reference_id) reference_view = static_cast<int>(v);
+    }
+    if (reference_view < 0 && history) reference_view = model::NearestViews(*object, history->T_camera_object, 1).front();
+  }
+
+  // How the points fare that ought to be seen in a frame the object is surely tracked in.
+  void CountSightings(const rgbd::Frame& frame, const Track& track) {
+    for (const int view : model::NearestViews(*object, track.T_camera_object, 1)) {
+      for (const int point : object->views[view].points) {
+        const model::ModelPoint& p = object->points[point];
+        const Eigen::Vector3d in_camera = track.T_camera_object * p.position;
+        const auto pixel = frame.camera.Project(in_camera);
+        if (!pixel || !frame.camera.Contains(*pixel)) continue;
+        if (-(track.T_camera_object.linear() * p.normal).dot(in_camera.normalized()) < 0.5) continue;
+        const auto depth = rgbd::DepthAt(frame, *pixel, 0);
+        if (depth && *depth < in_camera.z() - params.recogniser.confidence.occlusion_m) continue;
+        ++statistics[point].visible;
+      }
+    }
+    for (const recognition::GuidedMatch& match : track.matches) ++statistics[match.point].seen;
+  }
+
   // --- New views ---
 
   bool IsNewDirection(const geometry::Rigid& T_camera_object) const {
@@ -341,7 +406,9 @@ struct Learner::Impl {
     result.T_camera_object = track.T_camera_object;
     result.note = state == State::kTracking ? AddView(frame, track, pose_is_known) : "found again, not yet surely";
     result.view_added = result.note.empty();
+    if (state == State::kTracking && !pose_is_known) CountSightings(frame, track);
     if (result.view_added) {
+      if (!pose_is_known) refiner.ViewAdded(object->views.back().id);
       reference_view = static_cast<int>(object->views.size()) - 1;
     } else if (track.confidence.view >= 0) {
       reference_view = track.confidence.view;  // The view that explains the frame best.
@@ -385,7 +452,12 @@ Learner& Learner::operator=(Learner&&) noexcept = default;
 
 LearnerResult Learner::Process(const rgbd::Frame& frame, const Target& target, const std::optional<geometry::Rigid>& known_pose) {
   rgbd::CheckFrame(frame);
-  return impl_->object ? impl_->Continue(frame, known_pose) : impl_->Start(frame, target, known_pose);
+  const auto refinement = impl_->refiner.Take(++impl_->frame_number);
+  if (refinement) impl_->TakeEffect(*refinement);
+  LearnerResult result = impl_->object ? impl_->Continue(frame, known_pose) : impl_->Start(frame, target, known_pose);
+  result.refined = refinement.has_value();
+  if (impl_->object) impl_->StartRefinement();
+  return result;
 }
 
 void Learner::SetOthers(const std::vector<std::shared_ptr<const model::ObjectModel>>& others) {
@@ -398,6 +470,18 @@ void Learner::SetOthers(const std::vector<std::shared_ptr<const model::ObjectMod
 const std::string& Learner::name() const { return impl_->name; }
 
 std::shared_ptr<const model::ObjectModel> Learner::object() const { return impl_->object; }
+
+bool Learner::FinishRefinement() {
+  bool changed = false;
+  if (!impl_->object) return changed;
+  // Views may have come in while the last job ran: they are owed one of their own.
+  for (impl_->StartRefinement();; impl_->StartRefinement()) {
+    const auto refinement = impl_->refiner.Finish();
+    if (!refinement) return changed;
+    impl_->TakeEffect(*refinement);
+    changed = true;
+  }
+}
 
 void Learner::SetMeasures(const measures::Measures& measures) {
   if (!impl_->object) return;

@@ -57,6 +57,8 @@ class Learner {
   const std::string& name() const;
   // The model so far; null before the first view. A new object is made for every change: what was handed out stays as it was.
   std::shared_ptr<const model::ObjectModel> object() const;
+  // Waits for the refinement of every view so far and lets it take effect now, at the end of a run. Whether anything has changed.
+  bool FinishRefinement();
   // The measures p(o|c) is judged by from now on.
   void SetMeasures(const measures::Measures& measures);
 

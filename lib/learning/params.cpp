@@ -9,6 +9,9 @@ void LearnerParams::Check() const {
   plane.Check();
   clusters.Check();
   recogniser.Check();
+  refinement.Check();
+  loop_closure.Check();
+  upkeep.Check();
   const auto require = [](bool ok, const char* what) {
     if (!ok) throw std::invalid_argument(std::string("learner: ") + what);
   };
@@ -23,6 +26,8 @@ void LearnerParams::Check() const {
   require(min_roi_margin_px >= 0.0, "min_roi_margin_px must be >= 0");
   require(sure_probability > 0.0 && sure_probability < 1.0, "sure_probability must be in (0, 1)");
   require(confirm_frames >= 0, "confirm_frames must be >= 0");
+  require(refine_delay_frames >= 1, "refine_delay_frames must be >= 1");
+  require(refined_views >= 1, "refined_views must be >= 1");
   require(moved_frames >= 1, "moved_frames must be >= 1");
   require(max_mount_translation_m > 0.0, "max_mount_translation_m must be > 0");
   require(max_mount_rotation_deg > 0.0, "max_mount_rotation_deg must be > 0");

@@ -1,6 +1,9 @@
 // Every threshold of the online learner, in one place; the paper's values where it names one.
 #pragma once
 
+#include "learning/loop_closure.h"
+#include "learning/refinement.h"
+#include "learning/upkeep.h"
 #include "recognition/recogniser.h"
 #include "segmentation/clusters.h"
 #include "segmentation/plane.h"
@@ -24,6 +27,13 @@ struct LearnerParams {
   int surface_samples = 1000;       // Points of the learned surface that are drawn to the depth image; 0 = none.
   int surface_views = 3;            // ...taken from so many nearest views; >= 1.
   double agreement_prior = 0.9;     // p(o) of a pose found without the mount (or the last frames) that agrees with it; [1/2, 1).
+  // Refinement, beside tracking:
+  bool refine = true;            // Loops closed, views and points adjusted, the model tidied up.
+  int refine_delay_frames = 15;  // It takes effect so many frames after it began; >= 1.
+  int refined_views = 6;         // The newest so many are adjusted where no loop was closed; >= 1.
+  RefinementParams refinement;
+  LoopClosureParams loop_closure;
+  UpkeepParams upkeep;
   // Losing and finding again:
   double sure_probability = 0.9;  // An object found again with p(o|c) at least this is tracked at once; (0, 1).
   int confirm_frames = 3;         // ...with less only after so many more frames; nothing is learned meanwhile; >= 0.

@@ -389,8 +389,7 @@ void BundleParams::Check() const {
     if (!ok) throw std::invalid_argument(std::string("bundle: ") + what);
   };
   require(pixel_sigma > 0.0, "pixel_sigma must be > 0");
-  require(depth_noise.base_m > 0.0, "depth_noise.base_m must be > 0");
-  require(depth_noise.slope >= 0.0, "depth_noise.slope must be >= 0");
+  depth_noise.Check();
   require(robust_sigmas > 0.0, "robust_sigmas must be > 0");
   require(max_iterations >= 1, "max_iterations must be >= 1");
   require(max_anneal >= 1.0, "max_anneal must be >= 1");

@@ -74,6 +74,60 @@ void Fields(Visitor& visit, segmentation::ClusterParams& params) {
 }
 
 template <typename Visitor>
+void Fields(Visitor& visit, pose::DepthNoise& params) {
+  visit("base_m", params.base_m);
+  visit("slope", params.slope);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, pose::BundleParams& params) {
+  visit("pixel_sigma", params.pixel_sigma);
+  visit.Nested("depth_noise", params.depth_noise);
+  visit("robust_sigmas", params.robust_sigmas);
+  visit("max_iterations", params.max_iterations);
+  visit("max_anneal", params.max_anneal);
+  visit("tolerance", params.tolerance);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, learning::RefinementParams& params) {
+  visit.Nested("bundle", params.bundle);
+  visit("max_link_error_sigmas", params.max_link_error_sigmas);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, learning::LoopClosureParams& params) {
+  visit("max_view_angle_deg", params.max_view_angle_deg);
+  visit("max_octaves", params.max_octaves);
+  visit("max_shared", params.max_shared);
+  visit("max_candidates", params.max_candidates);
+  visit("max_ratio", params.max_ratio);
+  visit.Nested("ransac", params.ransac);
+  visit("min_inliers", params.min_inliers);
+  visit("min_inlier_share", params.min_inlier_share);
+  visit("min_spread", params.min_spread);
+  visit("max_drift_m", params.max_drift_m);
+  visit("max_drift_deg", params.max_drift_deg);
+  visit("surface_samples", params.surface_samples);
+  visit("surface_tolerance_m", params.surface_tolerance_m);
+  visit("min_surface_overlap", params.min_surface_overlap);
+  visit("max_surface_conflict", params.max_surface_conflict);
+  visit("min_linked_inliers", params.min_linked_inliers);
+  visit("seed", params.seed);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, learning::UpkeepParams& params) {
+  visit("max_descriptors", params.max_descriptors);
+  visit("min_visible", params.min_visible);
+  visit("min_seen_share", params.min_seen_share);
+  visit("redundant_angle_deg", params.redundant_angle_deg);
+  visit("redundant_octaves", params.redundant_octaves);
+  visit("max_views", params.max_views);
+  visit("min_view_points", params.min_view_points);
+}
+
+template <typename Visitor>
 void Fields(Visitor& visit, learning::LearnerParams& params) {
   visit.Nested("plane", params.plane);
   visit.Nested("clusters", params.clusters);
@@ -87,6 +141,12 @@ void Fields(Visitor& visit, learning::LearnerParams& params) {
   visit("surface_samples", params.surface_samples);
   visit("surface_views", params.surface_views);
   visit("agreement_prior", params.agreement_prior);
+  visit("refine", params.refine);
+  visit("refine_delay_frames", params.refine_delay_frames);
+  visit("refined_views", params.refined_views);
+  visit.Nested("refinement", params.refinement);
+  visit.Nested("loop_closure", params.loop_closure);
+  visit.Nested("upkeep", params.upkeep);
   visit("sure_probability", params.sure_probability);
   visit("confirm_frames", params.confirm_frames);
   visit("moved_frames", params.moved_frames);

@@ -1,0 +1,47 @@
+// Refinement beside tracking: closes loops, adjusts what was learned, tidies it up. It runs on a thread of its own and takes effect
+// at a stated frame, so that tracking never waits for it and a replay is the same on every run.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "learning/background.h"
+#include "learning/params.h"
+#include "model/object_model.h"
+
+namespace vantage::learning {
+
+// What came of one job.
+struct Refinement {
+  std::shared_ptr<const model::ObjectModel> base;  // What it was made from...
+  model::ObjectModel changed;                      // ...and what became of it.
+  int closures = 0;                                // Loops that were closed.
+};
+
+class Refiner {
+ public:
+  explicit Refiner(const LearnerParams& params) : params_(params) {}
+
+  // This view was added: the next job sees whether it closes a loop.
+  void ViewAdded(int view_id) { new_views_.push_back(view_id); }
+
+  // Starts a job for the views added since the last one; does nothing where there are none or a job is under way. `statistics`: one
+  // per point. `priors`: where the mount says the object is, by view id.
+  void StartIfDue(std::int64_t frame, const std::shared_ptr<const model::ObjectModel>& object,
+                  const std::vector<PointStatistics>& statistics, const std::map<int, pose::PosePrior>& priors);
+
+  // The result, at the frame where it takes effect; waits for it where it is not there by then.
+  std::optional<Refinement> Take(std::int64_t frame) { return job_.Take(frame); }
+  // The result of the job under way, whatever the frame.
+  std::optional<Refinement> Finish() { return job_.Finish(); }
+
+ private:
+  LearnerParams params_;
+  std::vector<int> new_views_;  // Ids.
+  Background<Refinement> job_;
+};
+
+}  // namespace vantage::learning
