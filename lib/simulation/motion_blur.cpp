@@ -9,16 +9,37 @@ namespace {
 constexpr float kStill_px = 0.25f;
 constexpr int kMostSamples = 48;
 
-// Adds the colour between pixels (bilinear, at the border the nearest).
-void AddSample(const cv::Mat& color, float x, float y, float* sum) {
-  x = std::clamp(x, 0.0f, static_cast<float>(color.cols - 1) - 1e-3f);
-  y = std::clamp(y, 0.0f, static_cast<float>(color.rows - 1) - 1e-3f);
-  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-  const float right = x - static_cast<float>(x0), below = y - static_cast<float>(y0);
-  const std::uint8_t* a = color.ptr<std::uint8_t>(y0) + 3 * x0;
-  const std::uint8_t* b = color.ptr<std::uint8_t>(y0 + 1) + 3 * x0;
-  const float w00 = (1 - right) * (1 - below), w10 = right * (1 - below), w01 = (1 - right) * below, w11 = right * below;
+// The path of a pixel while the shutter is open as a function of its 1 / z: fixed along a row but for the column.
+struct RowMotion {
+  float fx, fy, b, scale;
+  Eigen::Vector3f v, w;
+
+  // `a` is the column's (x - cx) / fx. ImageMotion, times the exposure.
+  Eigen::Vector2f Path(float a, float inverse_depth) const {
+    return {scale * fx * ((a * v.z() - v.x()) * inverse_depth + a * b * w.x() - (1 + a * a) * w.y() + b * w.z()),
+            scale * fy * ((b * v.z() - v.y()) * inverse_depth + (1 + b * b) * w.x() - a * b * w.y() - a * w.z())};
+  }
+};
+
+// Adds the colour between pixels (bilinear, at the border the nearest), times 256. (x, y) in 256ths of a pixel.
+inline void AddSample(const cv::Mat& color, int x, int y, int* sum) {
+  x = std::clamp(x, 0, 256 * (color.cols - 1) - 1);
+  y = std::clamp(y, 0, 256 * (color.rows - 1) - 1);
+  const int right = x & 255, below = y & 255;
+  const std::uint8_t* a = color.data + static_cast<std::size_t>(y >> 8) * color.step[0] + 3 * (x >> 8);
+  const std::uint8_t* b = a + color.step[0];
+  const int w11 = (right * below) >> 8, w10 = right - w11, w01 = below - w11, w00 = 256 - right - w01;
   for (int c = 0; c < 3; ++c) sum[c] += w00 * a[c] + w10 * a[c + 3] + w01 * b[c] + w11 * b[c + 3];
+}
+
+void AverageAlong(const Eigen::Vector2f& path, float length_px, int x, int y, const cv::Mat& sharp, std::uint8_t* out) {
+  const int samples = std::clamp(static_cast<int>(std::ceil(length_px)), 2, kMostSamples);
+  const Eigen::Vector2f step = 256.0f / static_cast<float>(samples) * path;
+  Eigen::Vector2f at(256.0f * static_cast<float>(x), 256.0f * static_cast<float>(y));
+  at -= 0.5f * static_cast<float>(samples - 1) * step;
+  int sum[3] = {128 * samples, 128 * samples, 128 * samples};
+  for (int i = 0; i < samples; ++i, at += step) AddSample(sharp, static_cast<int>(at.x()), static_cast<int>(at.y()), sum);
+  for (int c = 0; c < 3; ++c) out[c] = static_cast<std::uint8_t>(std::min(255, sum[c] / (256 * samples)));
 }
 
 }  // namespace
@@ -44,22 +65,17 @@ void BlurByMotion(const cv::Mat& depth, const geometry::PinholeCamera& camera, c
   if (exposure_s <= 0.0 || (twist.linear_m_s.isZero() && twist.angular_rad_s.isZero())) return;
   if (color->rows < 2 || color->cols < 2) return;
   const cv::Mat sharp = color->clone();
+  RowMotion motion{static_cast<float>(camera.fx),  static_cast<float>(camera.fy),  0.0f,
+                   static_cast<float>(exposure_s), twist.linear_m_s.cast<float>(), twist.angular_rad_s.cast<float>()};
   for (int y = 0; y < sharp.rows; ++y) {
     const float* z = depth.ptr<float>(y);
     std::uint8_t* out = color->ptr<std::uint8_t>(y);
+    motion.b = static_cast<float>((y - camera.cy) / camera.fy);
     for (int x = 0; x < sharp.cols; ++x) {
-      const Eigen::Vector2f path = (exposure_s * ImageMotion(camera, {x, y}, z[x] > 0.0f ? 1.0 / z[x] : 0.0, twist)).cast<float>();
-      const float length = path.norm();
-      if (length < kStill_px) continue;
-      const int samples = std::clamp(static_cast<int>(std::ceil(length)) + 1, 2, kMostSamples);
-      float sum[3] = {0.5f, 0.5f, 0.5f};
-      for (int i = 0; i < 3; ++i) sum[i] *= static_cast<float>(samples);
-      for (int i = 0; i < samples; ++i) {
-        const float at = (static_cast<float>(i) + 0.5f) / static_cast<float>(samples) - 0.5f;
-        AddSample(sharp, static_cast<float>(x) + at * path.x(), static_cast<float>(y) + at * path.y(), sum);
-      }
-      for (int c = 0; c < 3; ++c)
-        out[3 * x + c] = static_cast<std::uint8_t>(std::min(255.0f, sum[c] / static_cast<float>(samples)));
+      const float a = static_cast<float>((x - camera.cx) / camera.fx);
+      const Eigen::Vector2f path = motion.Path(a, z[x] > 0.0f ? 1.0f / z[x] : 0.0f);
+      const float length_px = path.norm();
+      if (length_px > kStill_px) AverageAlong(path, length_px, x, y, sharp, out + 3 * x);
     }
   }
 }

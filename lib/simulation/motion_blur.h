@@ -23,7 +23,7 @@ Eigen::Vector2d ImageMotion(const geometry::PinholeCamera& camera, const Eigen::
 
 // Averages every pixel of `color` (CV_8UC3) over its own path while the shutter is open, which is centred on the picture's time.
 // `depth` is CV_32FC1, metres, 0 = infinitely far. What comes out from behind an edge is not known and is taken from where the path
-// leads. Nothing is done where the path is shorter than a quarter of a pixel. About 8 ns a pixel and pixel of path.
+// leads. Nothing is done where the path is shorter than a quarter of a pixel. About 15 ms for 640 x 480 and 2 px.
 void BlurByMotion(const cv::Mat& depth, const geometry::PinholeCamera& camera, const Twist& twist, double exposure_s,
                   cv::Mat* color);
 

@@ -9,19 +9,34 @@
 
 namespace vantage::simulation {
 
+// A structured-light camera of the Kinect's kind, its depth registered to its colour image; every part can be switched off. Held
+// against 45 pictures of a real one (object segmentation data base, residuals of planes fitted to 21 x 21 pixels of the table):
+// sigma 1.1 mm at 0.7 m, 2.0 at 1.0, 4.0 at 1.45, here 1.4, 1.9, 3.3; depth steps at 1 m 2.9 mm, here 3.2; correlation with the
+// next three neighbours .67 .53 .41 along rows and .50 .26 .07 along columns, here .67 .35 .10 both ways; holes left and right of
+// objects 2 to 1, as here.
 struct SensorParams {
   int width = 640;
   int height = 480;
   double focal_length_px = 525.0;
-  bool depth_noise = true;  // Gaussian, sigma growing with depth: noise_base_m + noise_slope * (z - 0.4 m)^2.
-  double noise_base_m = 0.0012;
-  double noise_slope = 0.0019;
-  bool depth_holes = true;        // No depth at grazing angles and jumps.
-  double max_grazing_deg = 80.0;  // Angle between ray and normal beyond which there is no depth.
   double min_depth_m = 0.3;
   double max_depth_m = 4.0;
-  double image_noise = 2.0;  // Sigma, grey levels.
-  bool motion_blur = true;   // Where the camera's motion is told; see Look.
+  // Noise: Gaussian, sigma = noise_base_m + noise_slope * (z - 0.4 m)^2 (Nguyen, Izadi and Lovell, 2012), quantisation included.
+  bool depth_noise = true;
+  double noise_base_m = 0.0012;
+  double noise_slope = 0.0019;        // 1/m.
+  double noise_correlation_px = 1.2;  // Neighbours err alike: white noise smoothed by a Gaussian this wide; 0 = independent.
+  // Quantisation: the disparity baseline_m * focal_length_px / z comes in whole steps.
+  bool depth_quantised = true;
+  double baseline_m = 0.075;  // From the infrared camera to the projector.
+  double disparity_step_px = 0.125;
+  // Holes at grazing angles and at jumps in depth.
+  bool depth_holes = true;
+  double max_grazing_deg = 80.0;  // Angle between ray and normal beyond which there is no depth.
+  // Shadows: what the projector does not light or the infrared camera does not see beside near objects.
+  bool depth_shadows = true;
+  double projector_m = 0.05;  // The projector is so far to the right of the colour camera; the rest of the baseline is left.
+  double image_noise = 2.0;   // Sigma, grey levels.
+  bool motion_blur = true;    // Where the camera's motion is told; see Look.
   double exposure_s = 0.015;
 
   void Check() const;  // Throws std::invalid_argument naming the field.
@@ -77,7 +92,7 @@ class SimulatedWorld : public World {
   explicit SimulatedWorld(const WorldParams& params);
   ~SimulatedWorld() override;
 
-  // utime and id are left 0 for the caller to fill in. About 60 ms at 640 x 480 on one core.
+  // utime and id are left 0 for the caller to fill in. About 60 ms at 640 x 480 on one core, 80 in motion.
   rgbd::Frame Look(const geometry::Rigid& T_world_camera, std::uint32_t seed) const override;
   std::vector<geometry::Rigid> Viewpoints() const override { return {}; }
   // ...by a camera that moves while the shutter is open (sensor.motion_blur, exposure_s).

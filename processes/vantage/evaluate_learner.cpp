@@ -28,8 +28,8 @@ struct LearnerOptions {
 };
 
 constexpr int kPictureEvery = 90;
-constexpr int kReplacedEvery = 5;       // Frames of the end of a circle that are placed anew.
-constexpr double kEndOfCircle_s = 1.0;  // Before it closes.
+constexpr int kReplacedEvery = 5;  // Every n-th frame of a second of interest is placed anew.
+constexpr double kSecond_s = 1.0;
 
 // "003_cracker_box", a folder with textured.obj, or a file.
 fs::path MeshFile(const std::string& name) {
@@ -86,8 +86,14 @@ class OrbitRun {
     result["fault"] = options_.fault;
     result.update(FiguresOf(trial_));
     result["points"] = PointFigures(trial_, rendering::SurfaceDistance(world_.MeshOf(0)));
-    result["loop_end"] = Json::array();
-    for (int circle = 0; circle < sequence_.path().circles(); ++circle) result["loop_end"].push_back(LoopEnd(circle));
+    result["circles"] = Json::array();
+    for (int circle = 0; circle < sequence_.path().circles(); ++circle) {
+      const double closes_s = sequence_.path().ClosesAt_s(circle);
+      if (trial_.steps().back().truth.time_s < closes_s) break;
+      const double opens_s = circle == 0 ? 0.0 : sequence_.path().ClosesAt_s(circle - 1);
+      result["circles"].push_back(
+          {{"worst_second", Second(WorstSecond(opens_s, closes_s))}, {"last_second", Second(closes_s - kSecond_s)}});
+    }
     if (!folder_.empty()) {
       SaveTrial(trial_, name_ + ", fault: " + options_.fault, folder_);
       WriteWhole(folder_ / "figures.json", result.dump(2) + "\n");
@@ -96,14 +102,13 @@ class OrbitRun {
   }
 
  private:
-  // The last frames before a circle closes: as they were tracked, and as the model at the end places them.
-  Json LoopEnd(int circle) {
-    const double closes_s = sequence_.path().ClosesAt_s(circle);
+  // A second of a circle: as its frames were tracked, and as the model at the end places them.
+  Json Second(double from_s) {
     std::vector<PoseError> before, after;
     int tried = 0;
     for (std::size_t i = 0; i < trial_.steps().size(); ++i) {
       const TrialStep& step = trial_.steps()[i];
-      if (step.truth.time_s <= closes_s - kEndOfCircle_s || step.truth.time_s > closes_s) continue;
+      if (step.truth.time_s <= from_s || step.truth.time_s > from_s + kSecond_s) continue;
       if (step.error) before.push_back(*step.error);
       if (i % kReplacedEvery != 0 || !step.truth.usable) continue;
       ++tried;
@@ -111,8 +116,29 @@ class OrbitRun {
       orbit.frame.T_world_camera.reset();
       if (const auto error = trial_.Replaced(orbit.frame, step.truth)) after.push_back(*error);
     }
-    return {
-        {"as_tracked", ErrorFigures(before)}, {"by_final_model", ErrorFigures(after)}, {"tried", tried}, {"placed", after.size()}};
+    return {{"from_s", from_s},
+            {"as_tracked", ErrorFigures(before)},
+            {"by_final_model", ErrorFigures(after)},
+            {"tried", tried},
+            {"placed", after.size()}};
+  }
+
+  // When the second begins in which the track was worst (median over its frames): drift is largest before the circle closes.
+  double WorstSecond(double from_s, double to_s) const {
+    double worst = -1.0, worst_from_s = from_s;
+    for (double second_s = from_s; second_s + kSecond_s <= to_s; second_s += kSecond_s / 2) {
+      std::vector<double> sizes;  // 3 mm weigh as much as 0.5 degrees.
+      for (const TrialStep& step : trial_.steps()) {
+        if (step.error && step.truth.time_s > second_s && step.truth.time_s <= second_s + kSecond_s)
+          sizes.push_back(step.error->translation_mm / 3.0 + step.error->rotation_deg / 0.5);
+      }
+      const double size = Quantile(sizes, 0.5);
+      if (size > worst) {
+        worst = size;
+        worst_from_s = second_s;
+      }
+    }
+    return worst_from_s;
   }
 
   std::optional<Eigen::Vector2d> MiddlePixel(const geometry::Rigid& T_camera_mesh) const {
@@ -158,10 +184,15 @@ std::string SummaryOf(const Json& figures) {
     text << figures["points"]["count"] << " points, " << figures["points"]["surface_mm"]["median"] << " mm from the surface (p95 "
          << figures["points"]["surface_mm"]["p95"] << ")\n  ";
   }
-  for (const Json& end : figures["loop_end"]) {
-    text << "loop end: " << end["as_tracked"]["mm"]["median"] << " mm " << end["as_tracked"]["deg"]["median"] << " deg as tracked, "
-         << end["by_final_model"]["mm"]["median"] << " mm " << end["by_final_model"]["deg"]["median"] << " deg by the final model ("
-         << end["placed"] << " of " << end["tried"] << " placed)\n  ";
+  for (const Json& circle : figures["circles"]) {
+    for (const char* second : {"worst_second", "last_second"}) {
+      const Json& figure = circle[second];
+      text << (*second == 'w' ? "circle: worst second " : "; last second ") << figure["as_tracked"]["mm"]["median"] << " mm "
+           << figure["as_tracked"]["deg"]["median"] << " deg as tracked, " << figure["by_final_model"]["mm"]["median"] << " mm "
+           << figure["by_final_model"]["deg"]["median"] << " deg by the final model (" << figure["placed"] << " of "
+           << figure["tried"] << " placed)";
+    }
+    text << "\n  ";
   }
   if (!figures["after_fault"].is_null()) {
     text << "fault " << figures["fault"].get<std::string>() << ": tracked again after "

@@ -70,7 +70,7 @@ TEST_F(SmallWorld, LookIsDeterministicInPoseAndSeed) {
 
 // Depth unprojected by the pose lands on the table or the box, where the truth says they are.
 TEST_F(SmallWorld, DepthAgreesWithTheTruth) {
-  params_.sensor.depth_noise = false;
+  params_.sensor.depth_noise = params_.sensor.depth_quantised = false;
   const SimulatedWorld world(params_);
   const rgbd::Frame frame = world.Look(world.StartPose(), 1);
   const cv::Mat labels = world.Labels(world.StartPose());
@@ -103,7 +103,7 @@ TEST_F(SmallWorld, SensorNoiseIsWhatWasAskedFor) {
   SensorParams& sensor = params_.sensor;
   sensor.noise_base_m = 0.004;
   sensor.noise_slope = 0.0;
-  sensor.depth_holes = false;
+  sensor.depth_holes = sensor.depth_quantised = false;
   const SimulatedWorld noisy(params_);
   params_.sensor.depth_noise = false;
   params_.sensor.image_noise = 0.0;
