@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
+#include "pose/multi_ransac.h"
 #include "recognition/guided.h"
 #include "recognition/matching.h"
 #include "recognition/voting.h"
@@ -14,6 +16,7 @@ void RecogniserParams::Check() const {
   features.Check();
   confidence.Check();
   ransac.Check();
+  verification.Check();
   const auto require = [](bool ok, const char* what) {
     if (!ok) throw std::invalid_argument(std::string("recogniser: ") + what);
   };
@@ -51,47 +54,82 @@ struct Recogniser::Impl {
     return clusters;
   }
 
-  std::optional<Detection> Verify(const Known& known, const rgbd::Frame& frame, const features::Features& features,
-                                  const model::KeypointGrid& grid, const geometry::Rigid& T_camera_object) const {
+  // One cluster of tentative matches for each place where an object may be.
+  void AddClusters(const ObjectMatches& candidate, const features::Features& features, std::vector<pose::MatchCluster>* clusters,
+                   std::vector<const Known*>* owners) const {
+    const Known& known = *candidate.known;
+    const std::vector<Tentative>& matches = candidate.matches;
+    for (const VoteCluster& votes : Vote(known, features, matches)) {
+      pose::MatchCluster cluster;
+      cluster.min_inliers = params.min_inliers;
+      for (const int vote : votes.votes) {
+        const Tentative& match = matches[vote];
+        const cv::Point2f& pixel = features.keypoints[match.keypoint].pt;
+        cluster.matches.push_back({{pixel.x, pixel.y}, known.object->points[known.entries[match.row].point].position});
+        cluster.keypoints.push_back(match.keypoint);
+      }
+      clusters->push_back(std::move(cluster));
+      owners->push_back(&known);
+    }
+  }
+
+  // The pose refined on all that speaks for it; nullopt where that is too little or the depth image contradicts.
+  std::optional<Hypothesis> Verify(const Known& known, const rgbd::Frame& frame, const features::Features& features,
+                                   const model::KeypointGrid& grid, const geometry::Rigid& T_camera_object) const {
     const GuidedParams guided_params{params.guided_radius_px, params.guided_max_distance, params.ransac.inlier_px, 4};
     const GuidedPose guided = MatchGuided(*known.object, T_camera_object, frame, features, grid, guided_params);
     if (static_cast<int>(guided.matches.size()) < params.min_inliers) return std::nullopt;
-    Detection detection;
-    detection.object = known.object->name;
-    detection.T_camera_object = guided.T_camera_object;
-    detection.inliers = static_cast<int>(guided.matches.size());
+    Hypothesis hypothesis{known.object.get(), guided.T_camera_object, {}, {}, {}};
     int measured = 0, supported = 0;
     for (const GuidedMatch& match : guided.matches) {
       const cv::Point2f& pixel = features.keypoints[match.keypoint].pt;
-      detection.inlier_pixels.emplace_back(pixel.x, pixel.y);
-      if (!params.use_query_depth) continue;
-      if (const auto depth = rgbd::DepthAt(frame, detection.inlier_pixels.back())) {
+      hypothesis.keypoints.push_back(match.keypoint);
+      hypothesis.pixels.emplace_back(pixel.x, pixel.y);
+      const double z = (guided.T_camera_object * known.object->points[match.point].position).z();
+      hypothesis.depths_m.push_back(z);
+      if (const auto depth = rgbd::DepthAt(frame, hypothesis.pixels.back())) {
         ++measured;
-        const double z = (guided.T_camera_object * known.object->points[match.point].position).z();
         supported += std::abs(z - *depth) < params.ransac.max_depth_error_m;
       }
     }
     if (supported < params.ransac.min_depth_support * measured) return std::nullopt;
-    detection.confidence = model::ObjectConfidence(*known.object, detection.T_camera_object, frame, grid, params.confidence);
-    return detection;
+    const DepthEvidence evidence = CompareDepth(*known.object, guided.T_camera_object, frame, params.ransac.max_depth_error_m);
+    if (IsContradicted(evidence, params.verification)) return std::nullopt;
+    return hypothesis;
   }
 
-  std::optional<Detection> Find(const Known& known, const rgbd::Frame& frame, const features::Features& features,
-                                const model::KeypointGrid& grid, const std::vector<Tentative>& matches) const {
-    std::optional<Detection> best;
-    for (const VoteCluster& cluster : Vote(known, features, matches)) {
-      std::vector<pose::Match2d3d> points;
-      for (const int vote : cluster.votes) {
-        const cv::Point2f& pixel = features.keypoints[matches[vote].keypoint].pt;
-        points.push_back({{pixel.x, pixel.y}, known.object->points[known.entries[matches[vote].row].point].position});
+  // What may be in the frame, all objects together.
+  std::vector<Hypothesis> Find(const rgbd::Frame& frame, const features::Features& features,
+                               const model::KeypointGrid& grid) const {
+    std::vector<pose::MatchCluster> clusters;
+    std::vector<const Known*> owners;
+    for (const ObjectMatches& candidate : matcher.Match(features)) AddClusters(candidate, features, &clusters, &owners);
+    const pose::MultiPose found =
+        pose::EstimatePoses(clusters, frame.camera, params.use_query_depth ? &frame : nullptr, params.ransac, params.seed);
+    std::vector<std::optional<Hypothesis>> verified(clusters.size());
+    cv::parallel_for_(cv::Range(0, static_cast<int>(clusters.size())), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) {
+        if (found.poses[i]) verified[i] = Verify(*owners[i], frame, features, grid, found.poses[i]->T_camera_object);
       }
-      const auto estimate =
-          pose::EstimatePose(points, frame.camera, params.use_query_depth ? &frame : nullptr, params.ransac, params.seed);
-      if (!estimate || static_cast<int>(estimate->inliers.size()) < params.min_inliers) continue;
-      const auto detection = Verify(known, frame, features, grid, estimate->T_camera_object);
-      if (detection && (!best || detection->inliers > best->inliers)) best = detection;
+    });
+    std::vector<Hypothesis> hypotheses;
+    for (auto& hypothesis : verified) {
+      if (hypothesis) hypotheses.push_back(std::move(*hypothesis));
     }
-    return best;
+    return hypotheses;
+  }
+
+  Detection Judge(Hypothesis hypothesis, const rgbd::Frame& frame, const model::KeypointGrid& grid, double prior) const {
+    const model::ObjectModel& object = *hypothesis.object;
+    Detection detection;
+    detection.object = object.name;
+    detection.T_camera_object = hypothesis.T_camera_object;
+    detection.confidence = model::ObjectConfidence(object, detection.T_camera_object, frame, grid, params.confidence);
+    detection.probability = object.measures.observed.Probability(detection.confidence.value, prior);
+    detection.source = object.measures.observed.source();
+    detection.inliers = static_cast<int>(hypothesis.keypoints.size());
+    detection.inlier_pixels = std::move(hypothesis.pixels);
+    return detection;
   }
 };
 
@@ -125,18 +163,15 @@ std::vector<Detection> Recogniser::Recognise(const rgbd::Frame& frame, const fea
   rgbd::Frame query = frame;
   if (!params_.use_query_depth) query.depth = cv::Mat();
   const model::KeypointGrid grid(features.keypoints, frame.camera.width, frame.camera.height);
+  std::vector<Hypothesis> hypotheses = impl_->Find(query, features, grid);
   std::vector<Detection> detections;
-  for (const ObjectMatches& candidate : impl_->matcher.Match(features)) {
-    const Known& known = *candidate.known;
-    auto detection = impl_->Find(known, query, features, grid, candidate.matches);
-    if (!detection) continue;
+  for (const int i : ResolveConflicts(hypotheses, frame.camera, params_.min_inliers, params_.verification)) {
     double prior = 0.5;
     for (const auto& [object, value] : priors) {
-      if (object == known.object->name) prior = value;
+      if (object == hypotheses[i].object->name) prior = value;
     }
-    detection->probability = known.object->measures.observed.Probability(detection->confidence.value, prior);
-    detection->source = known.object->measures.observed.source();
-    if (detection->probability >= params_.min_probability) detections.push_back(std::move(*detection));
+    Detection detection = impl_->Judge(std::move(hypotheses[i]), query, grid, prior);
+    if (detection.probability >= params_.min_probability) detections.push_back(std::move(detection));
   }
   std::stable_sort(detections.begin(), detections.end(),
                    [](const auto& a, const auto& b) { return a.probability > b.probability; });

@@ -9,6 +9,7 @@
 #include "model/confidence.h"
 #include "model/object_model.h"
 #include "pose/ransac.h"
+#include "recognition/verification.h"
 
 namespace vantage::recognition {
 
@@ -22,8 +23,9 @@ struct RecogniserParams {
   int min_inliers = 7;                // Fewer supporting matches are no hypothesis; >= 4.
   double guided_radius_px = 8.0;      // Second round: model points look for their feature this near their projection; > 0.
   double guided_max_distance = 0.65;  // ...with a descriptor at least this similar; (0, 2].
-  bool use_query_depth = true;        // Poses the depth image contradicts are rejected; refinement uses depth.
-  double min_probability = 0.0;       // Detections with a lower p(o|c) are not reported; [0, 1].
+  VerificationParams verification;
+  bool use_query_depth = true;   // Poses the depth image contradicts are rejected; refinement uses depth.
+  double min_probability = 0.0;  // Detections with a lower p(o|c) are not reported; [0, 1].
   std::uint32_t seed = 0;
 
   void Check() const;               // Throws std::invalid_argument naming the field.
@@ -58,7 +60,8 @@ class Recogniser {
 
   features::Features Extract(const rgbd::Frame& frame) const;
 
-  // Detections by falling probability; at most one per object here. `priors`: p(o) by object name, 1/2 where not given.
+  // Detections by falling probability (equal: more inliers first); at most verification.max_instances per object. `priors`: p(o) by
+  // object name, 1/2 where not given.
   std::vector<Detection> Recognise(const rgbd::Frame& frame, const features::Features& features,
                                    const std::vector<std::pair<std::string, double>>& priors = {}) const;
 

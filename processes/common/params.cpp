@@ -35,6 +35,14 @@ void Fields(Visitor& visit, pose::RansacParams& params) {
 }
 
 template <typename Visitor>
+void Fields(Visitor& visit, recognition::VerificationParams& params) {
+  visit("max_seen_through", params.max_seen_through);
+  visit("merge_distance", params.merge_distance);
+  visit("min_own_share", params.min_own_share);
+  visit("max_instances", params.max_instances);
+}
+
+template <typename Visitor>
 void Fields(Visitor& visit, recognition::RecogniserParams& params) {
   visit.Nested("features", params.features);
   visit.Nested("confidence", params.confidence);
@@ -45,6 +53,7 @@ void Fields(Visitor& visit, recognition::RecogniserParams& params) {
   visit("min_inliers", params.min_inliers);
   visit("guided_radius_px", params.guided_radius_px);
   visit("guided_max_distance", params.guided_max_distance);
+  visit.Nested("verification", params.verification);
   visit("use_query_depth", params.use_query_depth);
   visit("min_probability", params.min_probability);
   visit("seed", params.seed);

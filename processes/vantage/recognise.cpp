@@ -3,9 +3,11 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <filesystem>
 #include <sstream>
 
 #include "model/store.h"
+#include "vantage/overlay.h"
 #include "vantage/sequence.h"
 #include "vantage/truth_judge.h"
 #include "vantage/verb.h"
@@ -18,7 +20,8 @@ struct RecogniseOptions {
   std::string store;
   std::string sequence;
   std::string frames = "all";
-  std::string bop;  // Result in the BOP challenge's format; empty = none.
+  std::string bop;       // Result in the BOP challenge's format; empty = none.
+  std::string overlays;  // Folder for one picture a frame; empty = none.
   bool no_query_depth = false;
   std::optional<int> truth_object_id;  // Hold the detections of the store's only object against the truth of this one.
 };
@@ -121,6 +124,9 @@ FrameResult RecogniseFrame(const recognition::Recogniser& recogniser, rgbd::Fram
 void RunRecognise(const RecogniseOptions& options) {
   CheckOutput(options.common);
   if (!options.bop.empty()) CheckWritable(options.bop);
+  if (!options.overlays.empty() && !std::filesystem::is_directory(options.overlays)) {
+    throw std::runtime_error(options.overlays + ": --overlays needs a folder that is there");
+  }
   params::LibraryParams params = LoadParams(options.common);
   if (options.no_query_depth) params.recogniser.use_query_depth = false;
   const rgbd::BopScene scene(options.sequence);
@@ -137,6 +143,10 @@ void RunRecognise(const RecogniseOptions& options) {
     const rgbd::Frame frame = scene.Load(id);
     frames.push_back(RecogniseFrame(recogniser, frame));
     if (judge) judge->Add(frame, frames.back().detections);
+    if (!options.overlays.empty()) {
+      const std::string file = options.overlays + "/" + std::to_string(id) + ".png";
+      WritePicture(file, DrawDetections(frame, frames.back().detections));
+    }
     ms.push_back(frames.back().ms);
     detections += frames.back().detections.size();
   }
@@ -182,6 +192,9 @@ void AddRecognise(CLI::App& app, Run& run) {
           "Write the detections in the BOP challenge's format; obj_id is the number the object's name ends in, else its place in "
           "the store's list")
       ->type_name("FILE.csv");
+  verb->add_option("--overlays", options->overlays,
+                   "Write a picture of every frame (ID.png) with the convex hulls of the matched points of what was recognised")
+      ->type_name("DIR");
   verb->callback([options, &run] { run = [options] { RunRecognise(*options); }; });
 }
 
