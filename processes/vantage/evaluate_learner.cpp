@@ -9,6 +9,7 @@
 
 #include "simulation/orbit_sequence.h"
 #include "vantage/learner_trial.h"
+#include "vantage/sequence_trial.h"
 
 namespace vantage::cli {
 namespace {
@@ -25,6 +26,7 @@ struct LearnerOptions {
   bool quick = false;
   bool tell_poses = false;
   std::string save;
+  SequenceTrialOptions sequence;
 };
 
 constexpr int kPictureEvery = 90;
@@ -78,6 +80,7 @@ class OrbitRun {
       const TrialStep& step = trial_.Step(orbit.frame, truth, target);
       if (!folder_.empty() && (i % kPictureEvery == 0 || step.wrong)) SavePicture(orbit, step);
     }
+    trial_.Finish();
   }
 
   Json Result() {
@@ -170,41 +173,6 @@ class OrbitRun {
   fs::path folder_;
 };
 
-std::string SummaryOf(const Json& figures) {
-  std::ostringstream text;
-  const Json& tracking = figures["tracking"];
-  const Json& views = figures["views"];
-  text << figures["object"].get<std::string>() << ": tracked " << tracking["tracked"] << " of " << tracking["usable"]
-       << " usable frames (" << tracking["wrong"] << " wrong), error " << tracking["error"]["mm"]["median"] << " mm "
-       << tracking["error"]["deg"]["median"] << " deg (median), max " << tracking["error"]["mm"]["max"] << " mm\n  "
-       << views["count"] << " views (" << views["wrong"] << " wrong), error " << views["error"]["mm"]["median"] << " mm "
-       << views["error"]["deg"]["median"] << " deg, max " << views["error"]["mm"]["max"] << " mm " << views["error"]["deg"]["max"]
-       << " deg\n  ";
-  if (!figures["points"].is_null()) {
-    text << figures["points"]["count"] << " points, " << figures["points"]["surface_mm"]["median"] << " mm from the surface (p95 "
-         << figures["points"]["surface_mm"]["p95"] << ")\n  ";
-  }
-  for (const Json& circle : figures["circles"]) {
-    for (const char* second : {"worst_second", "last_second"}) {
-      const Json& figure = circle[second];
-      text << (*second == 'w' ? "circle: worst second " : "; last second ") << figure["as_tracked"]["mm"]["median"] << " mm "
-           << figure["as_tracked"]["deg"]["median"] << " deg as tracked, " << figure["by_final_model"]["mm"]["median"] << " mm "
-           << figure["by_final_model"]["deg"]["median"] << " deg by the final model (" << figure["placed"] << " of "
-           << figure["tried"] << " placed)";
-    }
-    text << "\n  ";
-  }
-  if (!figures["after_fault"].is_null()) {
-    text << "fault " << figures["fault"].get<std::string>() << ": tracked again after "
-         << figures["after_fault"]["tracked_again_after_s"] << " s, tracked wrongly in "
-         << figures["after_fault"]["tracked_wrongly"] << " frames of it\n  ";
-  }
-  text << figures["ms"]["median"] << " ms a frame (p95 " << figures["ms"]["p95"] << "), of the processor "
-       << figures["cpu_ms"]["median"] << " (p95 " << figures["cpu_ms"]["p95"] << "); memory " << figures["memory_mb"]["first"]
-       << " -> " << figures["memory_mb"]["last"] << " MB\n";
-  return text.str();
-}
-
 // The world for one mesh; where it is swapped for another, that one is the last object.
 simulation::WorldParams WorldFor(const simulation::WorldParams& base, const std::vector<fs::path>& meshes) {
   return meshes.empty() ? base : simulation::WorldWithMeshes(base, meshes);
@@ -212,10 +180,15 @@ simulation::WorldParams WorldFor(const simulation::WorldParams& base, const std:
 
 void RunEvaluateLearner(const LearnerOptions& options) {
   CheckOutput(options.common);
-  if (options.meshes.empty() && options.world.empty())
-    throw std::runtime_error("say what to learn: --mesh, or --world FILE for its first object");
+  if (options.meshes.empty() && options.world.empty() && options.sequence.folder.empty()) {
+    throw std::runtime_error("say what to learn: --mesh, --world FILE for its first object, or --sequence DIR");
+  }
   cv::setNumThreads(1);
   const params::LibraryParams params = LoadParams(options.common);
+  if (!options.sequence.folder.empty()) {
+    const Json result = TrySequence(options.sequence, params.learner, options.save);
+    return WriteResult(options.common, result, SummaryOf(result));
+  }
   const simulation::WorldParams base =
       options.world.empty() ? simulation::WorldParams() : simulation::LoadWorldParams(options.world);
   const bool swapped = options.fault == simulation::ToString(simulation::Fault::kSwapped);
@@ -268,6 +241,26 @@ void AddEvaluateLearner(CLI::App& evaluate, Run& run) {
   verb->add_option("--frames", options->frames, "Stop after so many frames (default: two circles)")
       ->check(CLI::Range(1, 1000000))
       ->type_name("N");
+  SequenceTrialOptions& sequence = options->sequence;
+  CLI::Option* folder =
+      verb->add_option("--sequence", sequence.folder, "Learn from a recording (a BOP scene folder) instead")->type_name("DIR");
+  verb->add_option("--object-id", sequence.object_id, "The object of scene_gt.json to learn")
+      ->check(CLI::Range(1, 1000000))
+      ->needs(folder)
+      ->type_name("N");
+  verb->add_option("--learn-frames", sequence.frames,
+                   "With --sequence: learn from these: all, even, odd (by id), or ids A:B without B")
+      ->needs(folder)
+      ->capture_default_str();
+  verb->add_option("--passes", sequence.passes, "With --sequence: go through them so often")
+      ->check(CLI::Range(1, 100))
+      ->needs(folder)
+      ->capture_default_str();
+  verb->add_option("--find-frames", sequence.find,
+                   "With --sequence: then find the object in these by recognition, learning nothing")
+      ->needs(folder);
+  verb->add_flag("--no-query-depth", sequence.no_query_depth, "With --sequence: views are placed by their colour images only")
+      ->needs(folder);
   verb->add_flag("--quick", options->quick, "One circle at 10 Hz instead of two at 30");
   verb->add_flag("--tell-poses", options->tell_poses, "The learner is told where the camera is");
   verb->add_option("--save", options->save, "Write frames.csv, views.csv, plot.png (where gnuplot is found) and pictures here")

@@ -78,10 +78,13 @@ std::vector<ViewError> LearnerTrial::ViewErrors() const {
 
 std::optional<PoseError> LearnerTrial::Replaced(const rgbd::Frame& frame, const FrameTruth& truth) const {
   if (!learner_.object()) return std::nullopt;
+  constexpr int kLooks = 4;  // It takes some to be sure.
   learning::Learner again(params_, name_, learner_.object());
-  const learning::LearnerResult result = again.Process(frame);
-  if (!IsTracked(result)) return std::nullopt;
-  return ErrorOf(*result.T_camera_object, truth);
+  for (int look = 0; look < kLooks; ++look) {
+    const learning::LearnerResult result = again.Process(frame);
+    if (IsTracked(result)) return ErrorOf(*result.T_camera_object, truth);
+  }
+  return std::nullopt;
 }
 
 }  // namespace vantage::cli

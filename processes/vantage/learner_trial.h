@@ -59,6 +59,9 @@ class LearnerTrial {
   const TrialStep& Step(const rgbd::Frame& frame, const FrameTruth& truth, const learning::Target& target = {},
                         const std::optional<geometry::Rigid>& known_pose = std::nullopt);
 
+  // Lets what the learner does beside tracking come to its end; before what follows is asked.
+  void Finish() { learner_.FinishRefinement(); }
+
   const learning::Learner& learner() const { return learner_; }
   const std::vector<TrialStep>& steps() const { return steps_; }
   const std::optional<geometry::Rigid>& T_mesh_object() const { return T_mesh_object_; }
@@ -84,6 +87,9 @@ Json FiguresOf(const LearnerTrial& trial);
 Json PointFigures(const LearnerTrial& trial, const rendering::SurfaceDistance& surface);
 // {"median": .., "max": ..} and the like, of millimetres and degrees.
 Json ErrorFigures(const std::vector<PoseError>& errors);
+
+// The figures for people.
+std::string SummaryOf(const Json& figures);
 
 // DIR/frames.csv, DIR/views.csv and, where the program gnuplot is found, DIR/plot.png. Throws std::runtime_error where DIR cannot
 // be written.

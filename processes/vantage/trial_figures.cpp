@@ -176,6 +176,47 @@ Json PointFigures(const LearnerTrial& trial, const rendering::SurfaceDistance& s
   return figures;
 }
 
+std::string SummaryOf(const Json& figures) {
+  std::ostringstream text;
+  const Json& tracking = figures["tracking"];
+  const Json& views = figures["views"];
+  text << figures["object"].get<std::string>() << ": tracked " << tracking["tracked"] << " of " << tracking["usable"]
+       << " usable frames (" << tracking["wrong"] << " wrong), error " << tracking["error"]["mm"]["median"] << " mm "
+       << tracking["error"]["deg"]["median"] << " deg (median), max " << tracking["error"]["mm"]["max"] << " mm\n  "
+       << views["count"] << " views (" << views["wrong"] << " wrong), error " << views["error"]["mm"]["median"] << " mm "
+       << views["error"]["deg"]["median"] << " deg, max " << views["error"]["mm"]["max"] << " mm " << views["error"]["deg"]["max"]
+       << " deg\n  ";
+  if (figures.contains("points") && !figures["points"].is_null()) {
+    text << figures["points"]["count"] << " points, " << figures["points"]["surface_mm"]["median"] << " mm from the surface (p95 "
+         << figures["points"]["surface_mm"]["p95"] << ")\n  ";
+  }
+  for (const Json& circle : figures.value("circles", Json::array())) {
+    for (const char* second : {"worst_second", "last_second"}) {
+      const Json& figure = circle[second];
+      text << (*second == 'w' ? "circle: worst second " : "; last second ") << figure["as_tracked"]["mm"]["median"] << " mm "
+           << figure["as_tracked"]["deg"]["median"] << " deg as tracked, " << figure["by_final_model"]["mm"]["median"] << " mm "
+           << figure["by_final_model"]["deg"]["median"] << " deg by the final model (" << figure["placed"] << " of "
+           << figure["tried"] << " placed)";
+    }
+    text << "\n  ";
+  }
+  if (!figures["after_fault"].is_null()) {
+    text << "fault " << figures["fault"].get<std::string>() << ": tracked again after "
+         << figures["after_fault"]["tracked_again_after_s"] << " s, tracked wrongly in "
+         << figures["after_fault"]["tracked_wrongly"] << " frames of it\n  ";
+  }
+  if (figures.contains("found")) {
+    const Json& found = figures["found"];
+    text << "found in " << found["right"] << " of " << found["frames"] << " frames (" << found["wrong"] << " wrong), error "
+         << found["error"]["mm"]["median"] << " mm " << found["error"]["deg"]["median"] << " deg, max "
+         << found["error"]["mm"]["max"] << " mm " << found["error"]["deg"]["max"] << " deg\n  ";
+  }
+  text << figures["ms"]["median"] << " ms a frame (p95 " << figures["ms"]["p95"] << "), of the processor "
+       << figures["cpu_ms"]["median"] << " (p95 " << figures["cpu_ms"]["p95"] << "); memory " << figures["memory_mb"]["first"]
+       << " -> " << figures["memory_mb"]["last"] << " MB\n";
+  return text.str();
+}
+
 void SaveTrial(const LearnerTrial& trial, const std::string& title, const fs::path& folder) {
   std::error_code failed;
   fs::create_directories(folder, failed);

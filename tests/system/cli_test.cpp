@@ -130,6 +130,7 @@ TEST_F(Cli, MisuseIsOneLine) {
   ExpectRefused("evaluate", "vantage evaluate", {});
   ExpectRefused("evaluate learner", "vantage evaluate learner", {"--mesh", "--world"});
   ExpectRefused("evaluate learner --mesh gone", "vantage evaluate learner", {"gone", "textured.obj"});
+  ExpectRefused("evaluate learner --mesh a --passes 2", "vantage evaluate learner", {"--passes", "--sequence"});
   ExpectRefused("evaluate learner --mesh gone --fault tired", "vantage evaluate learner", {"tired", "covered"});
   EXPECT_TRUE(Files().empty());
 }
