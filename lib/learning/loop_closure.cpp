@@ -72,7 +72,9 @@ std::optional<geometry::Rigid> PoseAgainst(const model::ObjectModel& object, con
                                            const LoopClosureParams& params, LinkAttempt* attempt) {
   std::vector<pose::Match2d3d> matches;
   for (const features::Match& match : MutualMatches(view.features.descriptors, older.features.descriptors, params.max_ratio)) {
-    matches.push_back({PixelOf(view, match.query), object.points[older.points[match.train]].position, 0.0});
+    const Eigen::Vector2d pixel = PixelOf(view, match.query);
+    const double depth_m = rgbd::DepthAt(view.keyframe, pixel).value_or(0.0);
+    matches.push_back({pixel, object.points[older.points[match.train]].position, depth_m});
   }
   attempt->matches = static_cast<int>(matches.size());
   if (attempt->matches < params.min_inliers) return std::nullopt;
