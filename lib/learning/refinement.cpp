@@ -7,7 +7,9 @@
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <utility>
 
+#include "learning/keyframe.h"
 #include "learning/model_edit.h"
 
 namespace vantage::learning {
@@ -56,6 +58,69 @@ pose::BundleProblem ProblemOf(const model::ObjectModel& object, const Sightings&
   return problem;
 }
 
+// A view and how many points it shares with another.
+struct Kin {
+  int view = 0;
+  int shared = 0;
+};
+
+// The first `count` views but this one, the nearest of kin first: those that share most points with it (they were placed by each
+// other, while direction misleads where drift is being taken out), then the nearest in direction.
+std::vector<Kin> ByKinship(const model::ObjectModel& object, int view, int count) {
+  const std::set<int> own(object.views[view].points.begin(), object.views[view].points.end());
+  std::vector<std::tuple<int, double, int>> order;
+  for (int other = 0; other < count; ++other) {
+    if (other == view) continue;
+    const std::vector<int>& points = object.views[other].points;
+    const auto shared = std::count_if(points.begin(), points.end(), [&](int point) { return own.count(point) > 0; });
+    const double angle =
+        geometry::AngleBetween(object.views[view].viewpoint().direction, object.views[other].viewpoint().direction);
+    order.emplace_back(-static_cast<int>(shared), angle, other);
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<Kin> kin;
+  for (const auto& [shared, angle, other] : order) kin.push_back({other, -shared});
+  return kin;
+}
+
+std::vector<pose::SurfacePoint> SurfaceInCamera(model::View view, int count) {
+  view.T_camera_object = geometry::Rigid::Identity();
+  return SurfaceOfView(view, count);
+}
+
+// The depth images of free views fitted to those of the views that share most points with them, from where the problem has them.
+// Both ways, since each sees the other's surface where it is seen best.
+std::vector<pose::BundleRelation> SurfaceRelations(const model::ObjectModel& object, const pose::BundleProblem& problem,
+                                                   int first_free_view, const RefinementParams& params) {
+  const int count = static_cast<int>(object.views.size());
+  std::set<std::pair<int, int>> pairs;
+  for (int v = first_free_view; v < count; ++v) {
+    const std::vector<Kin> kin = ByKinship(object, v, count);
+    for (int i = 0; i < std::min(params.surface_neighbours, static_cast<int>(kin.size())); ++i) {
+      if (kin[i].shared < params.min_shared_points) break;
+      pairs.insert({v, kin[i].view});
+      pairs.insert({kin[i].view, v});
+    }
+  }
+  std::vector<pose::BundleRelation> relations;
+  std::vector<pose::SurfacePoint> surface;  // In camera coordinates of view a; pairs come sorted by a.
+  int surface_of = -1;
+  for (const auto& [a, b] : pairs) {
+    if (surface_of != a) {
+      surface = SurfaceInCamera(object.views[a], params.surface_samples);
+      surface_of = a;
+    }
+    const geometry::Rigid T_b_a = problem.views[b].T_camera_object * problem.views[a].T_camera_object.inverse();
+    const pose::SurfaceFit fit = pose::FitSurface(surface, object.views[b].keyframe, T_b_a, params.independent_samples);
+    if (fit.samples < params.surface_samples / 4) continue;
+    // How far the fit moves the middle of the surface.
+    const Eigen::Vector3d middle = surface[surface.size() / 2].point;
+    if ((fit.T_camera_object * middle - T_b_a * middle).norm() > params.max_surface_move_m) continue;
+    relations.push_back({a, b, fit.T_camera_object, fit.information});
+  }
+  return relations;
+}
+
 // Maps object coordinates as view `before` had them to those of `after`.
 geometry::Rigid Change(const model::View& before, const model::View& after) {
   return after.T_camera_object.inverse() * before.T_camera_object;
@@ -72,25 +137,6 @@ int IndexOfView(const model::ObjectModel& object, int id) {
   const auto found = std::lower_bound(object.views.begin(), object.views.end(), id,
                                       [](const model::View& view, int wanted) { return view.id < wanted; });
   return found != object.views.end() && found->id == id ? static_cast<int>(found - object.views.begin()) : -1;
-}
-
-// The first `count` views but this one, the nearest of kin first: those that share most points with it (they were placed by each
-// other, while direction misleads where drift is being taken out), then the nearest in direction.
-std::vector<int> ByKinship(const model::ObjectModel& object, int view, int count) {
-  const std::set<int> own(object.views[view].points.begin(), object.views[view].points.end());
-  std::vector<std::tuple<int, double, int>> order;
-  for (int other = 0; other < count; ++other) {
-    if (other == view) continue;
-    const std::vector<int>& points = object.views[other].points;
-    const auto shared = std::count_if(points.begin(), points.end(), [&](int point) { return own.count(point) > 0; });
-    const double angle =
-        geometry::AngleBetween(object.views[view].viewpoint().direction, object.views[other].viewpoint().direction);
-    order.emplace_back(-static_cast<int>(shared), angle, other);
-  }
-  std::sort(order.begin(), order.end());
-  std::vector<int> views;
-  for (const auto& [shared, angle, other] : order) views.push_back(other);
-  return views;
 }
 
 void RequireAppended(const model::ObjectModel& base, const model::ObjectModel& current) {
@@ -125,7 +171,15 @@ std::vector<int> PointsGoneTo(const model::ObjectModel& base, const model::Objec
 
 void RefinementParams::Check() const {
   bundle.Check();
-  if (!(max_link_error_sigmas > 0.0)) throw std::invalid_argument("refinement: max_link_error_sigmas must be > 0");
+  const auto require = [](bool ok, const char* what) {
+    if (!ok) throw std::invalid_argument(std::string("refinement: ") + what);
+  };
+  require(surface_samples >= 0, "surface_samples must be >= 0");
+  require(surface_neighbours >= 1, "surface_neighbours must be >= 1");
+  require(min_shared_points >= 1, "min_shared_points must be >= 1");
+  require(independent_samples > 0.0, "independent_samples must be > 0");
+  require(max_surface_move_m > 0.0, "max_surface_move_m must be > 0");
+  require(max_link_error_sigmas > 0.0, "max_link_error_sigmas must be > 0");
 }
 
 model::ObjectModel Refined(const model::ObjectModel& object, int first_free_view, const RefinementParams& params,
@@ -140,6 +194,15 @@ model::ObjectModel Refined(const model::ObjectModel& object, int first_free_view
   const Sightings sightings(object);
   pose::BundleProblem problem = ProblemOf(object, sightings, first_free_view, priors);
   report->bundle = pose::AdjustBundle(&problem, params.bundle);
+  if (params.surface_samples > 0) {
+    problem.relations = SurfaceRelations(object, problem, first_free_view, params);
+    const pose::BundleReport points_alone = report->bundle;
+    if (!problem.relations.empty()) report->bundle = pose::AdjustBundle(&problem, params.bundle);
+    report->bundle.iterations += points_alone.iterations;
+    report->bundle.initial_rms_px = points_alone.initial_rms_px;
+    report->bundle.initial_rms_depth_m = points_alone.initial_rms_depth_m;
+    report->relations = static_cast<int>(problem.relations.size());
+  }
 
   model::ObjectModel refined = object;
   for (size_t v = 0; v < refined.views.size(); ++v) {
@@ -190,10 +253,9 @@ geometry::Rigid ChangeOf(const model::ObjectModel& before, const model::ObjectMo
   const int index = IndexOfView(before, view_id);
   if (index < 0) throw std::invalid_argument("change: no view with id " + std::to_string(view_id));
   if (const int same = IndexOfView(after, view_id); same >= 0) return Change(before.views[index], after.views[same]);
-  const std::vector<int> partners = ByKinship(before, index, static_cast<int>(before.views.size()));
-  for (const int partner : partners) {
-    const int same = IndexOfView(after, before.views[partner].id);
-    if (same >= 0) return Change(before.views[partner], after.views[same]);
+  for (const Kin& kin : ByKinship(before, index, static_cast<int>(before.views.size()))) {
+    const int same = IndexOfView(after, before.views[kin.view].id);
+    if (same >= 0) return Change(before.views[kin.view], after.views[same]);
   }
   return geometry::Rigid::Identity();
 }
@@ -209,10 +271,10 @@ model::ObjectModel Rebased(const model::ObjectModel& base, const model::ObjectMo
   for (size_t v = base.views.size(); v < current.views.size(); ++v) {
     model::View view = current.views[v];
     geometry::Rigid T_changed_base = geometry::Rigid::Identity();
-    for (const int partner : ByKinship(current, static_cast<int>(v), static_cast<int>(v))) {
-      const int same = IndexOfView(result, current.views[partner].id);
+    for (const Kin& kin : ByKinship(current, static_cast<int>(v), static_cast<int>(v))) {
+      const int same = IndexOfView(result, current.views[kin.view].id);
       if (same < 0) continue;
-      T_changed_base = Change(current.views[partner], result.views[same]);
+      T_changed_base = Change(current.views[kin.view], result.views[same]);
       break;
     }
     for (int& point : view.points) {

@@ -13,6 +13,12 @@ namespace vantage::learning {
 
 struct RefinementParams {
   pose::BundleParams bundle;
+  int surface_samples = 300;           // Of each view's depth, drawn to its neighbours' depth images; 0 = points alone.
+  int surface_neighbours = 4;          // A free view is held against so many others, those that share most points; >= 1.
+  int min_shared_points = 6;           // ...if they share so many; >= 1.
+  double independent_samples = 100.0;  // Depths err together: the surface weighs as so many samples at most; > 0.
+  double max_surface_move_m =
+      0.008;  // A surface that wants a pair of views further from where points put them is not believed; > 0.
   double max_link_error_sigmas = 8.0;  // A view that is so far off from a point it is said to see saw another one; > 0.
 
   void Check() const;  // Throws std::invalid_argument naming the field.
@@ -20,6 +26,7 @@ struct RefinementParams {
 
 struct RefinementReport {
   pose::BundleReport bundle;
+  int relations = 0;         // Pairs of views whose surfaces were fitted to each other.
   int unlinked = 0;          // Keypoints that were found to have seen another point than said.
   double max_moved_m = 0.0;  // The farthest a view's T_camera_object moved.
   double max_turned_rad = 0.0;
@@ -27,7 +34,9 @@ struct RefinementReport {
 
 // The model with its views from index `first_free_view` on refined against all others, which stay: 1 = all but the first (global),
 // views.size() - k = the newest k (local). At least the first view always stays: it says where the object frame is. Points that two
-// or more views see are refined as well; a point that one view sees moves rigidly with it. A keypoint that disagrees with its point
+// or more views see are refined as well; a point that one view sees moves rigidly with it. Points alone come first; then, where
+// surface_samples > 0, the depth images of neighbouring views are fitted to each other and all is adjusted once more: what little
+// texture leaves open, the surface may know. A keypoint that disagrees with its point
 // grossly afterwards gets a point of its own where its depth was measured, and is dropped where it was not.
 //
 // `priors`: one per view or none at all; where something else (a mount) says the object is.

@@ -1,10 +1,6 @@
 #include "pose/bundle.h"
 
-#include <ceres/ceres.h>
-
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -12,163 +8,16 @@
 #include <stdexcept>
 #include <string>
 
+#include "pose/bundle_errors.h"
+
 namespace vantage::pose {
 namespace {
 
-constexpr double kMinDepth = 1e-3;     // Nearer points are behind the camera.
-constexpr double kBehindSigmas = 1e3;  // The error of a point behind the camera: flat, so that nothing pulls on it.
-constexpr double kInlierScales = 3.0;  // Robust scales within which an observation counts as right.
-constexpr double kStageRatio = 4.0;    // From one robust scale to the next.
-constexpr int kStageIterations = 4;    // At most, before the last stage.
-constexpr int kMinObservations = 3;    // A free view without a prior needs so many.
-
-using PoseBlock = std::array<double, 7>;  // Quaternion x y z w, translation: of T_camera_object.
-
-Eigen::Matrix3d Cross(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
-PoseBlock BlockOf(const geometry::Rigid& T) {
-  const Eigen::Quaterniond q(T.linear());
-  return {q.x(), q.y(), q.z(), q.w(), T.translation().x(), T.translation().y(), T.translation().z()};
-}
-
-geometry::Rigid RigidOf(const PoseBlock& block) {
-  geometry::Rigid T = geometry::Rigid::Identity();
-  T.linear() = Eigen::Map<const Eigen::Quaterniond>(block.data()).normalized().toRotationMatrix();
-  T.translation() = Eigen::Map<const Eigen::Vector3d>(block.data() + 4);
-  return T;
-}
-
-// Steps (translation, rotation vector) in camera coordinates: t + v, exp(w) R. The cost functions give their derivatives by the
-// step directly, in the first six columns, so that the derivative of Plus is [I; 0].
-class PoseManifold : public ceres::Manifold {
- public:
-  int AmbientSize() const override { return 7; }
-  int TangentSize() const override { return 6; }
-  bool Plus(const double* x, const double* delta, double* result) const override {
-    const Eigen::Map<const Eigen::Vector3d> rotation(delta + 3);
-    const double angle = rotation.norm();
-    Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-    if (angle > 1e-15) turn = Eigen::AngleAxisd(angle, rotation / angle);
-    Eigen::Map<Eigen::Quaterniond> turned(result);
-    turned = (turn * Eigen::Map<const Eigen::Quaterniond>(x)).normalized();
-    for (int i = 0; i < 3; ++i) result[4 + i] = x[4 + i] + delta[i];
-    return true;
-  }
-  bool PlusJacobian(const double*, double* jacobian) const override {
-    Eigen::Map<Eigen::Matrix<double, 7, 6, Eigen::RowMajor>> identity(jacobian);
-    identity.setIdentity();
-    return true;
-  }
-  bool Minus(const double* y, const double* x, double* difference) const override {
-    const Eigen::AngleAxisd turn(Eigen::Map<const Eigen::Quaterniond>(y) * Eigen::Map<const Eigen::Quaterniond>(x).conjugate());
-    Eigen::Map<Eigen::Vector3d> rotation(difference + 3);
-    rotation = turn.angle() * turn.axis();
-    for (int i = 0; i < 3; ++i) difference[i] = y[4 + i] - x[4 + i];
-    return true;
-  }
-  bool MinusJacobian(const double*, double* jacobian) const override {
-    Eigen::Map<Eigen::Matrix<double, 6, 7, Eigen::RowMajor>> identity(jacobian);
-    identity.setIdentity();
-    return true;
-  }
-};
-
-// A point seen by a camera: its rotated offset from the object's origin, and its camera coordinates.
-struct Seen {
-  Eigen::Matrix3d R;
-  Eigen::Vector3d offset;
-  Eigen::Vector3d p;
-
-  Seen(const double* pose, const double* point)
-      : R(Eigen::Map<const Eigen::Quaterniond>(pose).toRotationMatrix()),
-        offset(R * Eigen::Map<const Eigen::Vector3d>(point)),
-        p(offset + Eigen::Map<const Eigen::Vector3d>(pose + 4)) {}
-  bool InFront() const { return p.z() > kMinDepth; }
-};
-
-// Fills the Jacobians of two residuals whose derivative by the camera coordinates is `by_p`.
-void FillJacobians(const Seen& seen, const Eigen::Matrix<double, 2, 3>& by_p, double** jacobians) {
-  if (!jacobians) return;
-  if (jacobians[0]) {
-    Eigen::Map<Eigen::Matrix<double, 2, 7, Eigen::RowMajor>> by_pose(jacobians[0]);
-    by_pose.leftCols<3>() = by_p;
-    by_pose.middleCols<3>(3).noalias() = -by_p * Cross(seen.offset);
-    by_pose.col(6).setZero();
-  }
-  if (jacobians[1]) {
-    Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>> by_point(jacobians[1]);
-    by_point.noalias() = by_p * seen.R;
-  }
-}
-
-class PixelError : public ceres::SizedCostFunction<2, 7, 3> {
- public:
-  PixelError(const geometry::PinholeCamera& camera, const Eigen::Vector2d& pixel, double sigma)
-      : camera_(camera), pixel_(pixel), inverse_sigma_(1.0 / sigma) {}
-  bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
-    const Seen seen(parameters[0], parameters[1]);
-    Eigen::Matrix<double, 2, 3> by_p = Eigen::Matrix<double, 2, 3>::Zero();
-    if (seen.InFront()) {
-      const double inverse_z = 1.0 / seen.p.z();
-      const double x = seen.p.x() * inverse_z, y = seen.p.y() * inverse_z;
-      residuals[0] = (camera_.fx * x + camera_.cx - pixel_.x()) * inverse_sigma_;
-      residuals[1] = (camera_.fy * y + camera_.cy - pixel_.y()) * inverse_sigma_;
-      by_p << camera_.fx, 0, -camera_.fx * x, 0, camera_.fy, -camera_.fy * y;
-      by_p *= inverse_z * inverse_sigma_;
-    } else {
-      residuals[0] = residuals[1] = kBehindSigmas;
-    }
-    FillJacobians(seen, by_p, jacobians);
-    return true;
-  }
-
- private:
-  geometry::PinholeCamera camera_;
-  Eigen::Vector2d pixel_;
-  double inverse_sigma_;
-};
-
-// Two residuals, the second always 0: where all have two, Ceres eliminates the points by its fixed-size code, three times as fast.
-class DepthError : public ceres::SizedCostFunction<2, 7, 3> {
- public:
-  DepthError(double depth_m, double sigma_m) : depth_m_(depth_m), inverse_sigma_(1.0 / sigma_m) {}
-  bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
-    const Seen seen(parameters[0], parameters[1]);
-    residuals[0] = (seen.p.z() - depth_m_) * inverse_sigma_;
-    residuals[1] = 0.0;
-    Eigen::Matrix<double, 2, 3> by_p = Eigen::Matrix<double, 2, 3>::Zero();
-    by_p(0, 2) = inverse_sigma_;
-    FillJacobians(seen, by_p, jacobians);
-    return true;
-  }
-
- private:
-  double depth_m_;
-  double inverse_sigma_;
-};
-
-class PriorError : public ceres::SizedCostFunction<6, 7> {
- public:
-  explicit PriorError(const PosePrior& prior) : prior_(prior), pose_(BlockOf(prior.T_camera_object)) {}
-  bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
-    PoseManifold().Minus(parameters[0], pose_.data(), residuals);
-    for (int i = 0; i < 6; ++i) residuals[i] /= Sigma(i);
-    if (!jacobians || !jacobians[0]) return true;
-    Eigen::Map<Eigen::Matrix<double, 6, 7, Eigen::RowMajor>> jacobian(jacobians[0]);
-    jacobian.setZero();
-    for (int i = 0; i < 6; ++i) jacobian(i, i) = 1.0 / Sigma(i);  // To first order in the turn away from the prior.
-    return true;
-  }
-
- private:
-  double Sigma(int i) const { return i < 3 ? prior_.sigma_m : prior_.sigma_rad; }
-  PosePrior prior_;
-  PoseBlock pose_;
-};
+constexpr double kInlierScales = 3.0;    // Robust scales within which an observation counts as right.
+constexpr double kStageRatio = 4.0;      // From one robust scale to the next.
+constexpr int kStageIterations = 4;      // At most, before the last stage.
+constexpr int kMinObservations = 3;      // A free view without a prior or relation needs so many.
+constexpr double kRelationScales = 3.0;  // A relation has six errors in one: its robust scale is so many of an observation's.
 
 // One adjustment: which observations, views and points take part, their parameter blocks, the Ceres problem and its stages.
 class Adjustment {
@@ -186,7 +35,7 @@ class Adjustment {
     report.initial_cost = report.final_cost = Cost();
     report.converged = true;
     const std::vector<Eigen::Vector2d> before = Errors();
-    if (report.points + report.views > 0 && !used_.empty()) {
+    if (report.points + report.views > 0) {
       const std::vector<PoseBlock> first_poses = poses_;
       const std::vector<Eigen::Vector3d> first_points = problem_->points;
       Solve(&report);
@@ -217,15 +66,31 @@ class Adjustment {
     return !problem_->views[view].fixed && view != held_view_ && problem_->views[view].T_camera_object.matrix().allFinite();
   }
 
-  // Points need two views, one of them free; free views need three such points or a prior. What one loses the other may lose by it.
+  bool IsUsable(const BundleRelation& relation) const {
+    const int count = static_cast<int>(problem_->views.size());
+    const int a = relation.view_a, b = relation.view_b;
+    if (a < 0 || b < 0 || a >= count || b >= count || a == b) return false;
+    return relation.T_b_a.matrix().allFinite() && relation.information.allFinite() &&
+           problem_->views[a].T_camera_object.matrix().allFinite() && problem_->views[b].T_camera_object.matrix().allFinite();
+  }
+
+  // Points need two views, one of them free; free views need three such points, a relation or a prior. What one loses the other may
+  // lose by it.
   void SelectParts() {
     const auto& views = problem_->views;
     const bool anchored = std::any_of(views.begin(), views.end(), [](const BundleView& v) { return v.fixed || v.prior; });
     for (const BundleObservation& o : problem_->observations) {
       if (IsUsable(o)) used_.push_back(&o);
     }
-    if (!anchored && !used_.empty()) {
-      held_view_ = (*std::min_element(used_.begin(), used_.end(), [](auto* a, auto* b) { return a->view < b->view; }))->view;
+    std::vector<bool> related(views.size(), false);
+    for (const BundleRelation& relation : problem_->relations) {
+      if (!IsUsable(relation)) continue;
+      relations_.push_back(&relation);
+      related[relation.view_a] = related[relation.view_b] = true;
+    }
+    for (size_t v = 0; !anchored && held_view_ < 0 && v < views.size(); ++v) {
+      const bool takes_part = std::any_of(used_.begin(), used_.end(), [&](auto* o) { return o->view == int(v); });
+      if (takes_part || related[v]) held_view_ = static_cast<int>(v);
     }
     view_free_.assign(views.size(), false);
     for (size_t v = 0; v < views.size(); ++v) view_free_[v] = IsFree(static_cast<int>(v));
@@ -242,7 +107,7 @@ class Adjustment {
       std::vector<int> count(views.size(), 0);
       for (const auto* o : used_) ++count[o->view];
       for (size_t v = 0; v < views.size(); ++v) {
-        const bool keep = count[v] >= kMinObservations || views[v].prior;
+        const bool keep = count[v] >= kMinObservations || views[v].prior || related[v];
         if (!view_free_[v] || keep) continue;
         view_free_[v] = false;
         // Its few observations say nothing about where it is, so they must not pull on points either.
@@ -271,6 +136,14 @@ class Adjustment {
     const auto robust = [&](double sigmas) { return 0.5 * squared_scale * std::log1p(sigmas * sigmas / squared_scale); };
     double cost = 0.0;
     for (const Eigen::Vector2d& error : Errors()) cost += robust(error.x()) + (std::isnan(error.y()) ? 0.0 : robust(error.y()));
+    for (const BundleRelation* relation : relations_) {
+      if (!view_free_[relation->view_a] && !view_free_[relation->view_b]) continue;
+      Vector6d residuals;
+      const double* poses[2] = {poses_[relation->view_a].data(), poses_[relation->view_b].data()};
+      RelationError(*relation).Evaluate(poses, residuals.data(), nullptr);
+      const double scale = kRelationScales * params_.robust_sigmas;
+      cost += 0.5 * scale * scale * std::log1p(residuals.squaredNorm() / (scale * scale));
+    }
     for (size_t v = 0; v < poses_.size(); ++v) {
       if (!view_free_[v] || !problem_->views[v].prior) continue;
       double residuals[6];
@@ -296,8 +169,8 @@ class Adjustment {
     return std::min(anneal, params_.max_anneal);
   }
 
-  void Build(ceres::Problem* ceres_problem, ceres::LossFunction* loss, ceres::Manifold* manifold,
-             ceres::ParameterBlockOrdering* ordering) {
+  void Build(ceres::Problem* ceres_problem, ceres::LossFunction* loss, ceres::LossFunction* relation_loss,
+             ceres::Manifold* manifold, ceres::ParameterBlockOrdering* ordering) {
     for (const auto* o : used_) {
       double* pose = poses_[o->view].data();
       double* point = problem_->points[o->point].data();
@@ -307,6 +180,11 @@ class Adjustment {
         ceres_problem->AddResidualBlock(new DepthError(o->depth_m, params_.depth_noise.Sigma(o->depth_m)), loss, pose, point);
       }
       ordering->AddElementToGroup(point, 0);
+    }
+    for (const BundleRelation* relation : relations_) {
+      if (!view_free_[relation->view_a] && !view_free_[relation->view_b]) continue;
+      ceres_problem->AddResidualBlock(new RelationError(*relation), relation_loss, poses_[relation->view_a].data(),
+                                      poses_[relation->view_b].data());
     }
     for (size_t v = 0; v < poses_.size(); ++v) {
       double* pose = poses_[v].data();
@@ -323,13 +201,14 @@ class Adjustment {
   void Solve(BundleReport* report) {
     PoseManifold manifold;
     ceres::LossFunctionWrapper loss(nullptr, ceres::TAKE_OWNERSHIP);
+    ceres::LossFunctionWrapper relation_loss(nullptr, ceres::TAKE_OWNERSHIP);
     ceres::Problem::Options owned_here;
     owned_here.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     owned_here.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     ceres::Problem ceres_problem(owned_here);
     ceres::Solver::Options options;
     options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-    Build(&ceres_problem, &loss, &manifold, options.linear_solver_ordering.get());
+    Build(&ceres_problem, &loss, &relation_loss, &manifold, options.linear_solver_ordering.get());
     options.linear_solver_type = ceres::DENSE_SCHUR;
     options.num_threads = 1;  // The same sums in the same order every time.
     options.logging_type = ceres::SILENT;
@@ -337,6 +216,7 @@ class Adjustment {
     for (double anneal = FirstAnneal(); left > 0; anneal = std::max(1.0, anneal / kStageRatio)) {
       const bool last = anneal <= 1.0;
       loss.Reset(new ceres::CauchyLoss(anneal * params_.robust_sigmas), ceres::TAKE_OWNERSHIP);
+      relation_loss.Reset(new ceres::CauchyLoss(anneal * kRelationScales * params_.robust_sigmas), ceres::TAKE_OWNERSHIP);
       options.max_num_iterations = last ? left : std::min(left, kStageIterations);
       options.function_tolerance = last ? params_.tolerance : 10.0 * params_.tolerance;
       ceres::Solver::Summary summary;
@@ -377,6 +257,7 @@ class Adjustment {
   const BundleParams& params_;
   int held_view_ = -1;
   std::vector<const BundleObservation*> used_;
+  std::vector<const BundleRelation*> relations_;
   std::vector<bool> view_free_;
   std::vector<bool> point_free_;
   std::vector<PoseBlock> poses_;

@@ -26,10 +26,23 @@ struct BundleObservation {
   double depth_m = 0.0;   // Measured there along z, metres; 0 = none.
 };
 
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+// Two views' relative pose as measured by something else than points (their surfaces). `information` (inverse covariance) is of the
+// step (translation, metres; rotation vector, radians) in view b's camera coordinates from T_b_a to the present relative pose; it
+// may be singular, as where a surface slides along itself.
+struct BundleRelation {
+  int view_a = 0;  // Index into views.
+  int view_b = 0;
+  geometry::Rigid T_b_a = geometry::Rigid::Identity();
+  Matrix6d information = Matrix6d::Zero();
+};
+
 struct BundleProblem {
   std::vector<BundleView> views;
   std::vector<Eigen::Vector3d> points;  // Object frame, metres.
   std::vector<BundleObservation> observations;
+  std::vector<BundleRelation> relations;
 };
 
 struct BundleParams {
@@ -58,14 +71,14 @@ struct BundleReport {
   bool converged = false;     // The last stage ended by its tolerance; true where there was nothing to do.
 };
 
-// Minimises sum Cauchy(reprojection / pixel_sigma) + sum Cauchy((z - depth_m) / sigma(depth_m)) + priors over the poses of the
-// views that are not fixed and over all points two or more views see (Triggs et al., "Bundle adjustment: a modern synthesis",
-// 1999), by Levenberg-Marquardt with the points eliminated (Ceres; one thread, the same result every time).
+// Minimises sum Cauchy(reprojection / pixel_sigma) + sum Cauchy((z - depth_m) / sigma(depth_m)) + Cauchy(relations) + priors over
+// the poses of the views that are not fixed and over all points two or more views see (Triggs et al., "Bundle adjustment: a modern
+// synthesis", 1999), by Levenberg-Marquardt with the points eliminated (Ceres; one thread, the same result every time).
 //
-// Left as they are: points that fewer than two views or fixed views alone see, free views without a prior that see fewer than three
-// shared points. Left out: observations with a bad index, a value that is not finite, or a point behind the camera at the start.
-// Where no view is fixed and none has a prior, the first one is held. The cost never rises. Without any depth the scale is what the
-// start says. Cost: about 0.3 s for 40 views, 3000 points, 12000 observations on one core.
+// Left as they are: points that fewer than two views or fixed views alone see, free views without prior and relation that see
+// fewer than three shared points. Left out: observations with a bad index, a value that is not finite, or a point behind the camera
+// at the start. Where no view is fixed and none has a prior, the first one is held. The cost never rises. Without any depth the
+// scale is what the start says. Cost: about 0.3 s for 40 views, 3000 points, 12000 observations on one core.
 BundleReport AdjustBundle(BundleProblem* problem, const BundleParams& params);
 
 }  // namespace vantage::pose

@@ -33,6 +33,7 @@ struct NormalEquations {
   Matrix6d hessian = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
   int matches = 0;
+  int samples = 0;
 
   void Add(const Vector6d& jacobian, double residual, double weight) {
     hessian.noalias() += weight * jacobian * jacobian.transpose();
@@ -76,7 +77,8 @@ void AddSurface(const SurfacePoint& sample, const rgbd::Frame& frame, const geom
   if (normal.dot(p.normalized()) > -0.2) return;  // Seen at a grazing angle or from behind.
   const auto pixel = frame.camera.Project(p);
   if (!pixel || !frame.camera.Contains(*pixel)) return;
-  const auto measured = rgbd::PointAt(frame, *pixel, 1);
+  // A whole pixel: half a pixel beside it, its depth would be off a slanted surface.
+  const auto measured = rgbd::PointAt(frame, pixel->array().round(), 1);
   if (!measured) return;
   const double distance = normal.dot(p - *measured);
   if (std::abs(distance) > kMaxDistance) return;
@@ -85,6 +87,7 @@ void AddSurface(const SurfacePoint& sample, const rgbd::Frame& frame, const geom
   jacobian << normal, p.cross(normal);
   const double error = distance * inverse_sigma;
   equations->Add(jacobian * inverse_sigma, error, kSampleWeight * Cauchy(error * error, 2.0));
+  ++equations->samples;
 }
 
 void AddPrior(const PosePrior& prior, const geometry::Rigid& T, NormalEquations* equations) {
@@ -150,6 +153,26 @@ geometry::Rigid RefinePoseOnSurface(const std::vector<Match2d3d>& matches, const
     for (const SurfacePoint& sample : surface) AddSurface(sample, frame, T, equations);
     if (prior) AddPrior(*prior, T, equations);
   });
+}
+
+SurfaceFit FitSurface(const std::vector<SurfacePoint>& surface, const rgbd::Frame& frame, const geometry::Rigid& T_camera_object,
+                      double independent, int iterations) {
+  SurfaceFit fit;
+  fit.T_camera_object = T_camera_object;
+  for (int iteration = 0;; ++iteration) {
+    NormalEquations equations;
+    for (const SurfacePoint& sample : surface) AddSurface(sample, frame, fit.T_camera_object, &equations);
+    fit.samples = equations.samples;
+    fit.information = equations.hessian * std::min(1.0, independent / std::max(1, equations.samples));
+    if (iteration == iterations || equations.samples < 6) return fit;
+    // Directions in which the surface slides are held by a weight that is little beside any that it does not slide in.
+    const double held = 1e-3 * equations.hessian.topLeftCorner<3, 3>().trace();
+    equations.hessian.diagonal().head<3>().array() += held;
+    equations.hessian.diagonal().tail<3>().array() += held * fit.T_camera_object.translation().squaredNorm();
+    const Vector6d delta = -equations.hessian.ldlt().solve(equations.gradient);
+    if (!delta.allFinite()) return fit;
+    fit.T_camera_object = Perturbed(fit.T_camera_object, delta);
+  }
 }
 
 }  // namespace vantage::pose

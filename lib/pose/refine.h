@@ -41,4 +41,17 @@ geometry::Rigid RefinePoseOnSurface(const std::vector<Match2d3d>& matches, const
                                     const std::optional<PosePrior>& prior, const geometry::Rigid& T_camera_object, double scale_px,
                                     int iterations = 10);
 
+// What depth alone says about a pose.
+struct SurfaceFit {
+  geometry::Rigid T_camera_object = geometry::Rigid::Identity();
+  Eigen::Matrix<double, 6, 6> information;  // Of the step (translation, rotation vector) in camera coordinates; may be singular.
+  int samples = 0;                          // That were measured near enough.
+};
+
+// The pose that draws the surface to the frame's depth image (as above, but nothing else speaks). Where the surface could slide
+// along itself the pose stays; the information says which way. Neighbouring depths err together: all samples count as much as
+// `independent` ones at most. Cost: about 0.2 ms for 300 samples.
+SurfaceFit FitSurface(const std::vector<SurfacePoint>& surface, const rgbd::Frame& frame, const geometry::Rigid& T_camera_object,
+                      double independent, int iterations = 6);
+
 }  // namespace vantage::pose

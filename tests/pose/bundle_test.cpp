@@ -200,6 +200,49 @@ TEST(Bundle, APriorHoldsAViewThatSeesLittle) {
   EXPECT_LT(orbit.WorstView(problem), 0.003);
 }
 
+TEST(Bundle, ARelationPlacesAViewInTheDirectionsItKnows) {
+  OrbitOptions options;
+  options.outliers = 0.0;
+  const Orbit orbit(options);
+  BundleProblem problem = orbit.start;
+  problem.observations.erase(std::remove_if(problem.observations.begin(), problem.observations.end(),
+                                            [](const BundleObservation& o) { return o.view == 20; }),
+                             problem.observations.end());
+  const geometry::Rigid T_b_a = orbit.truth.views[20].T_camera_object * orbit.truth.views[19].T_camera_object.inverse();
+  BundleRelation relation{19, 20, T_b_a, 1e6 * Matrix6d::Identity()};
+  const auto relative_error = [&](const BundleProblem& p) {
+    return geometry::Difference(p.views[20].T_camera_object * p.views[19].T_camera_object.inverse(), T_b_a);
+  };
+  BundleProblem known = problem;
+  known.relations = {relation};
+  AdjustBundle(&known, BundleParams{});
+  EXPECT_LT(relative_error(known).translation_m, 1e-4);
+  EXPECT_LT(relative_error(known).rotation_rad, 1e-4);
+  EXPECT_LT(orbit.ErrorOfView(known, 20), 0.003);
+
+  // Known in depth alone, the rest stays about where it was.
+  relation.information = 1e-2 * Matrix6d::Identity();
+  relation.information(2, 2) = 1e6;
+  BundleProblem depth_only = problem;
+  depth_only.relations = {relation};
+  for (BundleView& view : depth_only.views) view.fixed = true;
+  depth_only.views[20].fixed = false;
+  AdjustBundle(&depth_only, BundleParams{});
+  const geometry::Rigid moved = depth_only.views[20].T_camera_object * problem.views[20].T_camera_object.inverse();
+  EXPECT_GT(std::abs(moved.translation().z()), 1e-5);
+  const geometry::Rigid left =
+      depth_only.views[20].T_camera_object * depth_only.views[19].T_camera_object.inverse() * T_b_a.inverse();
+  EXPECT_LT(std::abs(left.translation().z()), 1e-4);
+
+  BundleProblem bad = problem;  // Broken ones are left out.
+  bad.relations = {relation, relation, relation};
+  bad.relations[0].view_a = 99;
+  bad.relations[1].view_b = 19;
+  bad.relations[2].information(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  AdjustBundle(&bad, BundleParams{});
+  EXPECT_EQ(bad.views[20].T_camera_object.matrix(), problem.views[20].T_camera_object.matrix());
+}
+
 TEST(Bundle, TheWholeOrbitTakesLessThanASecond) {
   const Orbit orbit(OrbitOptions{40, 3800, 0.5, 0.1, true, true, 1});
   BundleProblem problem = orbit.start;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <array>
 
 #include "pose/p3p.h"
@@ -102,6 +103,54 @@ TEST(Refine, ConvergesFromNearBy) {
   start.translation() += Eigen::Vector3d(0.01, -0.01, 0.02);
   start.rotate(Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitX()));
   EXPECT_LT(geometry::Difference(RefinePose(matches, all, kCamera, start, 3.0, 20), T).translation_m, 1e-6);
+}
+
+// A corner of three planes fills the image; a single plane tells three directions only.
+TEST(Refine, ASurfaceFindsThePoseAndSaysWhatItDoesNotKnow) {
+  rgbd::Frame frame;
+  frame.camera = {160, 120, 130, 130, 79.5, 59.5};
+  for (const bool corner : {true, false}) {
+    frame.depth = cv::Mat::zeros(120, 160, CV_16UC1);
+    std::vector<SurfacePoint> surface;  // In camera coordinates: the true pose is the identity.
+    const std::vector<Eigen::Vector3d> normals =
+        corner ? std::vector<Eigen::Vector3d>{{0.5, 0.2, -0.8}, {-0.6, 0.1, -0.8}, {0.1, -0.7, -0.7}}
+               : std::vector<Eigen::Vector3d>{{0.2, 0.1, -0.9}};
+    for (int y = 0; y < 120; ++y) {
+      for (int x = 0; x < 160; ++x) {
+        const Eigen::Vector3d ray = frame.camera.Unproject({x, y}, 1.0);
+        double nearest = 0.0;  // A convex corner at 0.5 m: the farthest of its planes that faces the ray.
+        Eigen::Vector3d facing = Eigen::Vector3d::Zero();
+        for (const Eigen::Vector3d& n : normals) {
+          const double depth = n.normalized().dot(Eigen::Vector3d(0, 0, 0.5)) / n.normalized().dot(ray);
+          if (depth > nearest) {
+            nearest = depth;
+            facing = n.normalized();
+          }
+        }
+        if (nearest <= 0.0 || nearest > 2.0) continue;
+        frame.depth.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(std::lround(1000 * nearest));
+        if (x % 8 == 0 && y % 8 == 0) surface.push_back({nearest * ray, facing});
+      }
+    }
+    geometry::Rigid start = geometry::Rigid::Identity();
+    start.translation() = Eigen::Vector3d(0.004, -0.003, 0.005);
+    start.rotate(Eigen::AngleAxisd(0.01, Eigen::Vector3d(0.3, 1, 0.2).normalized()));
+    const SurfaceFit fit = FitSurface(surface, frame, start, 100.0);
+    EXPECT_GT(fit.samples, 100);
+    const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(fit.information).eigenvalues();
+    const Eigen::Vector3d middle(0, 0, 0.5);
+    if (corner) {
+      EXPECT_LT((fit.T_camera_object * middle - middle).norm(), 0.001);
+      EXPECT_GT(eigenvalues(0), 0.0);
+    } else {
+      EXPECT_LT(
+          std::abs(normals[0].normalized().dot(fit.T_camera_object * Eigen::Vector3d(0, 0, 0.5) - Eigen::Vector3d(0, 0, 0.5))),
+          0.001);
+      EXPECT_LT(fit.T_camera_object.translation().norm(), 0.02);  // It has not slid away.
+      EXPECT_LT(eigenvalues(2), 1e-6 * eigenvalues(5));
+    }
+  }
+  EXPECT_EQ(FitSurface({}, frame, geometry::Rigid::Identity(), 100.0).samples, 0);
 }
 
 }  // namespace
