@@ -108,7 +108,7 @@ std::optional<Track> Tracker::AgainstView(const model::ObjectModel& object, int 
   const model::View& reference = object.views[view];
   std::vector<pose::Match2d3d> matches;
   for (const features::Match& match :
-       features::MatchRatio(features.descriptors, reference.features.descriptors, recogniser.max_ratio)) {
+       features::MatchRatio(features.descriptors, reference.features.descriptors, recogniser.matching.max_ratio)) {
     const cv::Point2f& pixel = features.keypoints[match.query].pt;
     matches.push_back({{pixel.x, pixel.y}, object.points[reference.points[match.train]].position});
   }

@@ -7,7 +7,6 @@
 
 #include "pose/multi_ransac.h"
 #include "recognition/guided.h"
-#include "recognition/matching.h"
 #include "recognition/voting.h"
 
 namespace vantage::recognition {
@@ -15,12 +14,12 @@ namespace vantage::recognition {
 void RecogniserParams::Check() const {
   features.Check();
   confidence.Check();
+  matching.Check();
   ransac.Check();
   verification.Check();
   const auto require = [](bool ok, const char* what) {
     if (!ok) throw std::invalid_argument(std::string("recogniser: ") + what);
   };
-  require(max_ratio > 0.0 && max_ratio <= 1.0, "max_ratio must be in (0, 1]");
   require(max_clusters >= 1, "max_clusters must be >= 1");
   require(vote_bandwidth > 0.0, "vote_bandwidth must be > 0");
   require(min_inliers >= 4, "min_inliers must be >= 4");
@@ -30,12 +29,12 @@ void RecogniserParams::Check() const {
 }
 
 std::string RecogniserParams::Fingerprint() const {
-  return features.Fingerprint() + "|" + confidence.Fingerprint() + "|" + std::to_string(max_ratio) + ":" +
+  return features.Fingerprint() + "|" + confidence.Fingerprint() + "|" + std::to_string(matching.max_ratio) + ":" +
          std::to_string(min_inliers) + ":" + std::to_string(ransac.inlier_px);
 }
 
 struct Recogniser::Impl {
-  explicit Impl(const RecogniserParams& all) : params(all), matcher(all.max_ratio) {}
+  explicit Impl(const RecogniserParams& all) : params(all), matcher(all.matching, all.features.type) {}
 
   RecogniserParams params;
   Matcher matcher;

@@ -9,6 +9,7 @@
 #include "model/confidence.h"
 #include "model/object_model.h"
 #include "pose/ransac.h"
+#include "recognition/matching.h"
 #include "recognition/verification.h"
 
 namespace vantage::recognition {
@@ -16,7 +17,7 @@ namespace vantage::recognition {
 struct RecogniserParams {
   features::FeatureParams features;
   model::ConfidenceParams confidence;
-  double max_ratio = 0.85;      // Best over second-best descriptor distance; (0, 1].
+  MatchingParams matching;
   double vote_bandwidth = 0.5;  // Of the mean shift, in radii of the object; > 0.
   int max_clusters = 6;         // Vote clusters (heaviest first) that get a pose hypothesis; >= 1.
   pose::RansacParams ransac;

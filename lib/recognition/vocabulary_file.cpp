@@ -2,6 +2,7 @@
 #include <cstring>
 #include <fstream>
 #include <stdexcept>
+#include <tuple>
 
 #include "model/blobs.h"
 #include "recognition/kmeans.h"
@@ -117,13 +118,18 @@ class VocabularyReader {
  public:
   VocabularyReader(std::istream& stream, std::uint64_t bytes) : reader_(stream, bytes) {}
 
-  VocabularyTree Read() {
-    VocabularyTree tree;
+  // Name and length of the descriptors, which come first.
+  std::pair<std::string, int> ReadKind() {
     std::string name(std::min(reader_.Get<std::uint32_t>(), kMaxNameBytes), ' ');
     reader_.Bytes(name.data(), name.size());
-    tree.descriptor_ = name;
-    tree.length_ = reader_.Get<std::int32_t>();
-    Require(tree.length_ >= 1 && tree.length_ <= kMaxLength, "a length is out of range");
+    const int length = reader_.Get<std::int32_t>();
+    Require(length >= 1 && length <= kMaxLength, "a length is out of range");
+    return {name, length};
+  }
+
+  VocabularyTree Read() {
+    VocabularyTree tree;
+    std::tie(tree.descriptor_, tree.length_) = ReadKind();
     tree.params_.branching = reader_.Get<std::int32_t>();
     tree.params_.depth = reader_.Get<std::int32_t>();
     tree.params_.iterations = reader_.Get<std::int32_t>();
@@ -180,37 +186,76 @@ class VocabularyReader {
   std::vector<float> centroids_;
 };
 
-VocabularyTree VocabularyTree::Load(const std::filesystem::path& file, const std::string& descriptor, int length) {
+namespace {
+
+// What is before the body.
+struct Seal {
+  std::uint64_t checksum = 0;  // Of the body.
+  std::uint64_t bytes = 0;     // Of the body.
+};
+
+Seal OpenFile(const std::filesystem::path& file, std::ifstream& stream) {
   const std::string name = file.string();
-  std::ifstream stream(file, std::ios::binary);
+  stream.open(file, std::ios::binary);
   if (!stream || std::filesystem::is_directory(file)) {
     throw std::runtime_error(name + ": expected a vocabulary file, found none" + kRemedy);
   }
   char magic[kMagicBytes] = {};
-  std::uint64_t seal[2] = {0, 0};  // Checksum and size of the rest.
+  Seal seal;
   stream.read(magic, kMagicBytes);
   if (!stream || std::memcmp(magic, kMagic, kMagicBytes) != 0) {
     throw std::runtime_error(name + ": expected a vocabulary file, found something else" + kRemedy);
   }
-  stream.read(reinterpret_cast<char*>(seal), sizeof(seal));
-  const std::uint64_t size = std::filesystem::file_size(file), header = kMagicBytes + sizeof(seal);
-  if (!stream || size != header + seal[1]) {
-    throw std::runtime_error(name + ": the vocabulary is damaged: expected " + std::to_string(header + seal[1]) + " bytes, found " +
+  stream.read(reinterpret_cast<char*>(&seal), sizeof(seal));
+  const std::uint64_t size = std::filesystem::file_size(file), expected = kMagicBytes + sizeof(seal) + seal.bytes;
+  if (!stream || size != expected) {
+    throw std::runtime_error(name + ": the vocabulary is damaged: expected " + std::to_string(expected) + " bytes, found " +
                              std::to_string(size) + "; copy it again, or" + (kRemedy + 1));
   }
+  return seal;
+}
+
+void CheckKind(const std::filesystem::path& file, const std::string& descriptor, int length, const std::string& found,
+               int found_length) {
+  if ((descriptor.empty() || found == descriptor) && (length == 0 || found_length == length)) return;
+  const auto kind = [](const std::string& name, int values) {
+    return name + " descriptors" + (values > 0 ? " of " + std::to_string(values) + " values" : "");
+  };
+  throw std::runtime_error(file.string() + ": expected a vocabulary of " + kind(descriptor, length) + ", found one of " +
+                           kind(found, found_length) +
+                           "; train one with these features (vantage vocabulary train), or change the features");
+}
+
+std::runtime_error DamageOf(const std::filesystem::path& file, const Damaged& error) {
+  return std::runtime_error(file.string() + ": the vocabulary is damaged: " + error.what() + "; copy it again, or" + (kRemedy + 1));
+}
+
+}  // namespace
+
+VocabularyTree VocabularyTree::Load(const std::filesystem::path& file, const std::string& descriptor, int length) {
+  std::ifstream stream;
+  const Seal seal = OpenFile(file, stream);
   try {
-    VocabularyReader body(stream, seal[1]);
+    VocabularyReader body(stream, seal.bytes);
     VocabularyTree tree = body.Read();
     Require(body.reader().left() == 0, "bytes are left over");
-    Require(body.reader().checksum() == seal[0], "its checksum does not match");
-    if ((!descriptor.empty() && tree.descriptor_ != descriptor) || (length > 0 && tree.length_ != length)) {
-      throw std::runtime_error(name + ": expected a vocabulary of " + descriptor + " descriptors of " + std::to_string(length) +
-                               " values, found " + tree.descriptor_ + " of " + std::to_string(tree.length_) +
-                               "; train one with these features (vantage vocabulary train), or change the features");
-    }
+    Require(body.reader().checksum() == seal.checksum, "its checksum does not match");
+    CheckKind(file, descriptor, length, tree.descriptor_, tree.length_);
     return tree;
   } catch (const Damaged& error) {
-    throw std::runtime_error(name + ": the vocabulary is damaged: " + error.what() + "; copy it again, or" + (kRemedy + 1));
+    throw DamageOf(file, error);
+  }
+}
+
+void VocabularyTree::CheckFile(const std::filesystem::path& file, const std::string& descriptor) {
+  std::ifstream stream;
+  const Seal seal = OpenFile(file, stream);
+  try {
+    VocabularyReader body(stream, seal.bytes);
+    const auto [name, length] = body.ReadKind();
+    CheckKind(file, descriptor, 0, name, length);
+  } catch (const Damaged& error) {
+    throw DamageOf(file, error);
   }
 }
 

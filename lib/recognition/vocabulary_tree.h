@@ -62,6 +62,8 @@ class VocabularyTree {
   // Throws std::runtime_error, one line with what was expected and found and what to do: no such file, not a vocabulary, damaged,
   // or of another descriptor than `descriptor` of `length` values ("" and 0 = any).
   static VocabularyTree Load(const std::filesystem::path& file, const std::string& descriptor = "", int length = 0);
+  // Throws as Load does, but looks at the file's size and header only: what is damaged inside, Load finds.
+  static void CheckFile(const std::filesystem::path& file, const std::string& descriptor);
 
  private:
   struct Node {

@@ -43,10 +43,26 @@ void Fields(Visitor& visit, recognition::VerificationParams& params) {
 }
 
 template <typename Visitor>
+void Fields(Visitor& visit, recognition::MatchingParams& params) {
+  visit("max_ratio", params.max_ratio);
+  visit("exhaustive_points", params.exhaustive_points);
+  visit("max_candidates", params.max_candidates);
+  visit("paths", params.paths);
+  visit("neighbours", params.neighbours);
+  visit("max_chance_ratio", params.max_chance_ratio);
+  visit("ranking", params.ranking);
+  visit("norm", params.norm);
+  visit("background_documents", params.background_documents);
+  visit("vocabulary", params.vocabulary);
+  visit("branching", params.branching);
+  visit("max_leaf_points", params.max_leaf_points);
+}
+
+template <typename Visitor>
 void Fields(Visitor& visit, recognition::RecogniserParams& params) {
   visit.Nested("features", params.features);
   visit.Nested("confidence", params.confidence);
-  visit("max_ratio", params.max_ratio);
+  visit.Nested("matching", params.matching);
   visit("vote_bandwidth", params.vote_bandwidth);
   visit("max_clusters", params.max_clusters);
   visit.Nested("ransac", params.ransac);

@@ -174,7 +174,7 @@ TEST_F(Cli, ConfigurationErrorsNameFileAndLine) {
   Write("a.yaml", "learner:\n  min_view_pionts: 3\n");
   ExpectRefused("learn --sequence plain --store a.db --config a.yaml", "vantage learn",
                 {"a.yaml:2: unknown key 'min_view_pionts'"});
-  Write("b.yaml", "recogniser:\n  max_ratio: 7\n");
+  Write("b.yaml", "recogniser:\n  matching: {max_ratio: 7}\n");
   ExpectRefused("learn --sequence plain --store a.db --config b.yaml", "vantage learn", {"b.yaml:2: ", "max_ratio"});
   Write("c.yaml", "recogniser: [\n");
   ExpectRefused("learn --sequence plain --store a.db --config c.yaml", "vantage learn", {"c.yaml:"});
