@@ -10,6 +10,7 @@ void AddEvaluate(CLI::App& app, Run& run) {
   verb->require_subcommand(1);
   verb->set_version_flag("--version", "vantage " VANTAGE_VERSION);
   AddEvaluateLearner(*verb, run);
+  AddEvaluateRecogniser(*verb, run);
 }
 
 }  // namespace vantage::cli

@@ -35,6 +35,7 @@ void AddModels(CLI::App& app, Run& run);
 void AddEvaluate(CLI::App& app, Run& run);
 // The parts of `evaluate`.
 void AddEvaluateLearner(CLI::App& evaluate, Run& run);
+void AddEvaluateRecogniser(CLI::App& evaluate, Run& run);
 void AddVocabulary(CLI::App& app, Run& run);
 
 // --seed, --json, --config and --version.

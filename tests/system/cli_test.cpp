@@ -95,8 +95,8 @@ class Cli : public ::testing::Test {
 };
 
 TEST_F(Cli, HelpAndVersionOfEveryVerb) {
-  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "evaluate learner", "models list", "models show",
-                           "vocabulary train", "vocabulary show"}) {
+  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "evaluate learner", "evaluate recogniser", "models list",
+                           "models show", "vocabulary train", "vocabulary show"}) {
     SCOPED_TRACE(verb);
     const Outcome help = Run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
@@ -132,6 +132,10 @@ TEST_F(Cli, MisuseIsOneLine) {
   ExpectRefused("evaluate learner --mesh gone", "vantage evaluate learner", {"gone", "textured.obj"});
   ExpectRefused("evaluate learner --mesh a --passes 2", "vantage evaluate learner", {"--passes", "--sequence"});
   ExpectRefused("evaluate learner --mesh gone --fault tired", "vantage evaluate learner", {"tired", "covered"});
+  ExpectRefused("evaluate recogniser", "vantage evaluate recogniser", {"--world", "--absent"});
+  ExpectRefused("evaluate recogniser --absent a,b", "vantage evaluate recogniser", {"--store"});
+  ExpectRefused("evaluate recogniser --store gone.db --absent a", "vantage evaluate recogniser", {"gone.db"});
+  ExpectRefused("evaluate recogniser --world gone.yaml", "vantage evaluate recogniser", {"gone.yaml"});
   EXPECT_TRUE(Files().empty());
 }
 
@@ -270,6 +274,28 @@ TEST_F(Cli, LearnsRecognisesAndShows) {
   ExpectRefused("models show mug --store a.db", "vantage models show", {"a.db", "mug"});
   EXPECT_EQ(Files(), (std::vector<std::string>{"a.db", "b.db", "found.csv", "found.json"}))
       << "stores are one file each when closed";
+}
+
+// The shipped table of four boxes: learned from few views, found in one frame; what was learned is kept, and is not in a picture of
+// nothing.
+TEST_F(Cli, TheRecogniserIsHeldAgainstATable) {
+  const Outcome outcome = Run("evaluate recogniser --quick --world '" VANTAGE_SOURCE_DIR
+                              "/config/worlds/table.yaml' --store t.db --save pictures --json -");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json clutter = Json::parse(outcome.out)["clutter"];
+  EXPECT_EQ(clutter["objects"], 4);
+  EXPECT_EQ(clutter["frames"], 1);
+  EXPECT_GE(clutter["right_in_start_frame"], 3);
+  EXPECT_EQ(clutter["all"]["wrong"], 0);
+  EXPECT_GE(clutter["occlusion"].size(), 4u);
+  EXPECT_FALSE(cv::imread((folder_ / "pictures" / "overlay_0_0.png").string()).empty());
+
+  MakeScene("plain");
+  const Outcome absent = Run("evaluate recogniser --store t.db --absent plain --json -");
+  ASSERT_EQ(absent.code, 0) << absent.err;
+  EXPECT_EQ(Json::parse(absent.out)["absent"]["frames"], 3);
+  EXPECT_EQ(Json::parse(absent.out)["absent"]["objects"], 4);
+  EXPECT_EQ(Json::parse(absent.out)["absent"]["detections"], 0);
 }
 
 TEST_F(Cli, AVocabularyIsTrainedAndShown) {
