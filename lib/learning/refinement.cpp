@@ -193,11 +193,16 @@ model::ObjectModel Refined(const model::ObjectModel& object, int first_free_view
   *report = {};
   const Sightings sightings(object);
   pose::BundleProblem problem = ProblemOf(object, sightings, first_free_view, priors);
-  report->bundle = pose::AdjustBundle(&problem, params.bundle);
+  pose::BundleParams coarse = params.bundle;
+  if (params.surface_samples > 0) coarse.tolerance *= 10.0;  // It is only where surfaces start from.
+  report->bundle = pose::AdjustBundle(&problem, coarse);
   if (params.surface_samples > 0) {
     problem.relations = SurfaceRelations(object, problem, first_free_view, params);
     const pose::BundleReport points_alone = report->bundle;
-    if (!problem.relations.empty()) report->bundle = pose::AdjustBundle(&problem, params.bundle);
+    pose::BundleParams fine = params.bundle;
+    fine.max_anneal = 1.0;  // The start is good.
+    report->bundle = pose::AdjustBundle(&problem, fine);
+    report->bundle.initial_cost = points_alone.initial_cost;
     report->bundle.iterations += points_alone.iterations;
     report->bundle.initial_rms_px = points_alone.initial_rms_px;
     report->bundle.initial_rms_depth_m = points_alone.initial_rms_depth_m;
