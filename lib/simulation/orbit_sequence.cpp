@@ -84,6 +84,7 @@ void FaultParams::Check() const {
   };
   require(start_s >= 0.0, "start_s must be >= 0");
   require(duration_s >= 0.0, "duration_s must be >= 0");
+  require(turn_share > 0.0 && turn_share <= 1.0, "turn_share must be in (0, 1]");
   require(dropped_share >= 0.0 && dropped_share < 1.0, "dropped_share must be in [0, 1)");
 }
 
@@ -104,7 +105,8 @@ OrbitSequence::OrbitSequence(SimulatedWorld& world, const SequenceParams& params
     world_.ShowObject(*other_, false);
   }
   std::mt19937 random(params.seed ^ kDropSeed);
-  const int count = static_cast<int>(std::floor(path_.duration_s() * params.rate_hz)) + 1;
+  const double held_up_s = ClosesAt_s(path_.circles() - 1) - path_.ClosesAt_s(path_.circles() - 1);
+  const int count = static_cast<int>(std::floor((path_.duration_s() + held_up_s) * params.rate_hz)) + 1;
   for (int number = 0; number < count; ++number) {
     const bool dropped = static_cast<double>(random()) / 4294967296.0 < params.fault.dropped_share;
     if (params.fault.fault == Fault::kDropped && IsFaulty(number / params.rate_hz) && dropped) continue;
@@ -117,8 +119,21 @@ bool OrbitSequence::IsFaulty(double time_s) const {
   return fault.fault != Fault::kNone && time_s >= fault.start_s && time_s < fault.start_s + DurationOf(fault);
 }
 
+double OrbitSequence::PathTime_s(double time_s) const {
+  const FaultParams& fault = params_.fault;
+  if (fault.fault != Fault::kCovered && fault.fault != Fault::kSwapped) return time_s;
+  return time_s - (1.0 - fault.turn_share) * std::clamp(time_s - fault.start_s, 0.0, DurationOf(fault));
+}
+
+double OrbitSequence::ClosesAt_s(int circle) const {
+  const FaultParams& fault = params_.fault;
+  const double on_path_s = path_.ClosesAt_s(circle), into_fault_s = on_path_s - fault.start_s;
+  if (into_fault_s <= 0.0 || PathTime_s(on_path_s) == on_path_s) return on_path_s;
+  return fault.start_s + std::min(into_fault_s / fault.turn_share, into_fault_s + (1.0 - fault.turn_share) * DurationOf(fault));
+}
+
 geometry::Rigid OrbitSequence::CameraAt(double time_s) const {
-  geometry::Rigid T_world_camera = path_.PoseAt(time_s);
+  geometry::Rigid T_world_camera = path_.PoseAt(PathTime_s(time_s));
   if (params_.fault.fault != Fault::kMoved) return T_world_camera;
   const double since_s = time_s - params_.fault.start_s, left_s = DurationOf(params_.fault) - since_s;
   const double away = SmoothStep(since_s / kTurnAway_s) * SmoothStep(left_s / kTurnAway_s);
@@ -165,7 +180,7 @@ OrbitFrame OrbitSequence::Frame(int index) {
   result.time_s = number / params_.rate_hz;
   result.T_world_camera = CameraAt(result.time_s);
   result.faulty = IsFaulty(result.time_s);
-  while (result.circle + 1 < path_.circles() && result.time_s > path_.ClosesAt_s(result.circle)) ++result.circle;
+  while (result.circle + 1 < path_.circles() && result.time_s > ClosesAt_s(result.circle)) ++result.circle;
 
   const bool gone = params_.fault.fault == Fault::kSwapped && result.faulty;
   const geometry::Rigid T_world_mesh = ObjectAt(result.time_s);

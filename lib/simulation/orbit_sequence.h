@@ -32,6 +32,8 @@ struct FaultParams {
   double look_away_deg = 75.0;
   double shake_rad_s = 4.0;  // At 525 px and 15 ms: 30 px of blur.
   double dropped_share = 0.5;
+  double turn_share = 0.25;  // While covered or swapped the camera goes on at this share of its speed: the side that shows
+                             // afterwards should be one that was seen; (0, 1].
 
   void Check() const;  // Throws std::invalid_argument naming the field.
 };
@@ -52,7 +54,7 @@ struct OrbitFrame {
   std::optional<geometry::Rigid> T_camera_mesh;  // nullopt where the object is not there.
   double time_s = 0.0;
   int circle = 0;
-  bool faulty = false;  // The fault is at work.
+  bool faulty = false;  // The fault is at work (where frames are dropped: some were).
   bool usable = false;  // The object can be found in it: it is there, well inside the image, and no fault spoils the picture.
 };
 
@@ -66,9 +68,12 @@ class OrbitSequence {
   int size() const { return static_cast<int>(numbers_.size()); }
   // Deterministic in (params, index), in whatever order frames are asked for. Moves the world's objects.
   OrbitFrame Frame(int index);
-  const OrbitPath& path() const { return path_; }
+  int circles() const { return path_.circles(); }
+  // As OrbitPath::ClosesAt_s, on this sequence's clock.
+  double ClosesAt_s(int circle) const;
 
  private:
+  double PathTime_s(double time_s) const;  // Where on its path the camera is.
   bool IsFaulty(double time_s) const;
   geometry::Rigid CameraAt(double time_s) const;
   geometry::Rigid ObjectAt(double time_s) const;

@@ -90,10 +90,10 @@ class OrbitRun {
     result.update(FiguresOf(trial_));
     result["points"] = PointFigures(trial_, rendering::SurfaceDistance(world_.MeshOf(0)));
     result["circles"] = Json::array();
-    for (int circle = 0; circle < sequence_.path().circles(); ++circle) {
-      const double closes_s = sequence_.path().ClosesAt_s(circle);
+    for (int circle = 0; circle < sequence_.circles(); ++circle) {
+      const double closes_s = sequence_.ClosesAt_s(circle);
       if (trial_.steps().back().truth.time_s < closes_s) break;
-      const double opens_s = circle == 0 ? 0.0 : sequence_.path().ClosesAt_s(circle - 1);
+      const double opens_s = circle == 0 ? 0.0 : sequence_.ClosesAt_s(circle - 1);
       result["circles"].push_back(
           {{"worst_second", Second(WorstSecond(opens_s, closes_s))}, {"last_second", Second(closes_s - kSecond_s)}});
     }

@@ -57,6 +57,7 @@ Json FaultFigures(const std::vector<TrialStep>& steps) {
   int tracked_wrongly = 0;
   for (const TrialStep& step : steps) tracked_wrongly += step.truth.faulty && step.wrong;
   figures["tracked_wrongly"] = tracked_wrongly;
+  figures["lasts_to_the_end"] = last == steps.rbegin();
   figures["tracked_again_after_s"] = nullptr;
   std::optional<double> usable_from_s;
   for (auto step = last.base(); step != steps.end(); ++step) {
@@ -201,9 +202,10 @@ std::string SummaryOf(const Json& figures) {
     text << "\n  ";
   }
   if (!figures["after_fault"].is_null()) {
-    text << "fault " << figures["fault"].get<std::string>() << ": tracked again after "
-         << figures["after_fault"]["tracked_again_after_s"] << " s, tracked wrongly in "
-         << figures["after_fault"]["tracked_wrongly"] << " frames of it\n  ";
+    const Json& after = figures["after_fault"];
+    text << "fault " << figures["fault"].get<std::string>() << ": ";
+    if (!after["lasts_to_the_end"].get<bool>()) text << "tracked again after " << after["tracked_again_after_s"] << " s, ";
+    text << "tracked wrongly in " << after["tracked_wrongly"] << " frames of it\n  ";
   }
   if (figures.contains("found")) {
     const Json& found = figures["found"];

@@ -126,7 +126,10 @@ TEST_F(Sequence, FramesAreNumberedTimedAndDoNotTellThePose) {
 TEST_F(Sequence, ACoveredCameraSeesNothing) {
   params_.fault.fault = Fault::kCovered;
   OrbitSequence sequence(world_, params_);
-  const OrbitFrame covered = At(sequence, 2.2), after = At(sequence, 4.2);
+  const OrbitFrame covered = At(sequence, 2.2), before = sequence.Frame(9), after = At(sequence, 4.2);
+  // The camera goes on more slowly: 2 s at a quarter of 30 degrees/s, and 0.4 s at all of it.
+  EXPECT_NEAR(geometry::Difference(before.T_world_camera, after.T_world_camera).rotation_rad, 24 * kDeg, 5 * kDeg);
+  EXPECT_NEAR(sequence.ClosesAt_s(0), 12.0 + 1.5, 1e-9);
   EXPECT_TRUE(covered.faulty && !covered.usable);
   EXPECT_LT(cv::mean(covered.frame.color)[0], 10.0);
   EXPECT_EQ(cv::countNonZero(covered.frame.depth), 0);
