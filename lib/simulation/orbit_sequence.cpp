@@ -121,7 +121,8 @@ bool OrbitSequence::IsFaulty(double time_s) const {
 
 double OrbitSequence::PathTime_s(double time_s) const {
   const FaultParams& fault = params_.fault;
-  if (fault.fault != Fault::kCovered && fault.fault != Fault::kSwapped) return time_s;
+  const bool hides = fault.fault == Fault::kCovered || fault.fault == Fault::kSwapped || fault.fault == Fault::kBlur;
+  if (!hides) return time_s;
   return time_s - (1.0 - fault.turn_share) * std::clamp(time_s - fault.start_s, 0.0, DurationOf(fault));
 }
 

@@ -32,7 +32,7 @@ struct FaultParams {
   double look_away_deg = 75.0;
   double shake_rad_s = 4.0;  // At 525 px and 15 ms: 30 px of blur.
   double dropped_share = 0.5;
-  double turn_share = 0.25;  // While covered or swapped the camera goes on at this share of its speed: the side that shows
+  double turn_share = 0.25;  // While covered, swapped or shaken the camera goes on at this share of its speed: the side that shows
                              // afterwards should be one that was seen; (0, 1].
 
   void Check() const;  // Throws std::invalid_argument naming the field.
