@@ -1,15 +1,32 @@
 #include "recognition/recogniser.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "pose/multi_ransac.h"
 #include "recognition/guided.h"
 #include "recognition/voting.h"
 
 namespace vantage::recognition {
+namespace {
+
+// Seconds since the last call.
+class Stopwatch {
+ public:
+  double Lap() {
+    const auto now = std::chrono::steady_clock::now();
+    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
 
 void RecogniserParams::Check() const {
   features.Check();
@@ -98,13 +115,17 @@ struct Recogniser::Impl {
   }
 
   // What may be in the frame, all objects together.
-  std::vector<Hypothesis> Find(const rgbd::Frame& frame, const features::Features& features,
-                               const model::KeypointGrid& grid) const {
+  std::vector<Hypothesis> Find(const rgbd::Frame& frame, const features::Features& features, const model::KeypointGrid& grid,
+                               Stopwatch& watch, StageTimes& times) const {
+    const std::vector<ObjectMatches> candidates = matcher.Match(features);
+    times.match_s = watch.Lap();
     std::vector<pose::MatchCluster> clusters;
     std::vector<const Known*> owners;
-    for (const ObjectMatches& candidate : matcher.Match(features)) AddClusters(candidate, features, &clusters, &owners);
+    for (const ObjectMatches& candidate : candidates) AddClusters(candidate, features, &clusters, &owners);
+    times.vote_s = watch.Lap();
     const pose::MultiPose found =
         pose::EstimatePoses(clusters, frame.camera, params.use_query_depth ? &frame : nullptr, params.ransac, params.seed);
+    times.pose_s = watch.Lap();
     std::vector<std::optional<Hypothesis>> verified(clusters.size());
     cv::parallel_for_(cv::Range(0, static_cast<int>(clusters.size())), [&](const cv::Range& range) {
       for (int i = range.start; i < range.end; ++i) {
@@ -158,11 +179,13 @@ features::Features Recogniser::Extract(const rgbd::Frame& frame) const {
 }
 
 std::vector<Detection> Recogniser::Recognise(const rgbd::Frame& frame, const features::Features& features,
-                                             const std::vector<std::pair<std::string, double>>& priors) const {
+                                             const std::vector<std::pair<std::string, double>>& priors, StageTimes* times) const {
+  Stopwatch watch;
+  StageTimes spent;
   rgbd::Frame query = frame;
   if (!params_.use_query_depth) query.depth = cv::Mat();
   const model::KeypointGrid grid(features.keypoints, frame.camera.width, frame.camera.height);
-  std::vector<Hypothesis> hypotheses = impl_->Find(query, features, grid);
+  std::vector<Hypothesis> hypotheses = impl_->Find(query, features, grid, watch, spent);
   std::vector<Detection> detections;
   for (const int i : ResolveConflicts(hypotheses, frame.camera, params_.min_inliers, params_.verification)) {
     double prior = 0.5;
@@ -174,6 +197,8 @@ std::vector<Detection> Recogniser::Recognise(const rgbd::Frame& frame, const fea
   }
   std::stable_sort(detections.begin(), detections.end(),
                    [](const auto& a, const auto& b) { return a.probability > b.probability; });
+  spent.verify_s = watch.Lap();
+  if (times != nullptr) *times = spent;
   return detections;
 }
 

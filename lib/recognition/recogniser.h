@@ -43,6 +43,14 @@ struct Detection {
   std::vector<Eigen::Vector2d> inlier_pixels;
 };
 
+// Where the time of one frame went, seconds.
+struct StageTimes {
+  double match_s = 0.0;   // Quantising, ranking objects, tentative matches.
+  double vote_s = 0.0;    // (7) and mean shift.
+  double pose_s = 0.0;    // (8).
+  double verify_s = 0.0;  // Guided matching, refinement, depth, conflicts, confidence.
+};
+
 // The frame's features are computed once by the caller, who may share them between recogniser, learner and trials.
 class Recogniser {
  public:
@@ -62,9 +70,10 @@ class Recogniser {
   features::Features Extract(const rgbd::Frame& frame) const;
 
   // Detections by falling probability (equal: more inliers first); at most verification.max_instances per object. `priors`: p(o) by
-  // object name, 1/2 where not given.
+  // object name, 1/2 where not given. `times` may be null.
   std::vector<Detection> Recognise(const rgbd::Frame& frame, const features::Features& features,
-                                   const std::vector<std::pair<std::string, double>>& priors = {}) const;
+                                   const std::vector<std::pair<std::string, double>>& priors = {},
+                                   StageTimes* times = nullptr) const;
 
  private:
   struct Impl;
