@@ -5,6 +5,7 @@
 #include <iostream>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <sstream>
 
 #include "simulation/orbit_sequence.h"
@@ -24,6 +25,7 @@ struct LearnerOptions {
   std::string fault = "none";
   int frames = 0;  // 0 = all of the orbit.
   bool quick = false;
+  std::optional<double> start_azimuth_deg;  // None = before the broadest side.
   bool tell_poses = false;
   std::string save;
   SequenceTrialOptions sequence;
@@ -43,10 +45,27 @@ fs::path MeshFile(const std::string& name) {
   throw std::runtime_error("--mesh " + name + ": neither a file nor a folder with textured.obj, nor in meshes/ of $VANTAGE_DATA");
 }
 
-simulation::SequenceParams SequenceOf(const LearnerOptions& options) {
+// From where the object looks broadest (the first of the directions), degrees about the world's z from x, in steps of 5.
+double BroadestSide_deg(const simulation::TrueObject& object) {
+  const Eigen::Matrix3Xd points = object.T_world_object * object.points;
+  double broadest_m = 0.0, azimuth_deg = 0.0;
+  for (int degrees = 0; degrees < 180; degrees += 5) {
+    const double azimuth = degrees * M_PI / 180.0;
+    const Eigen::RowVectorXd across = Eigen::RowVector3d(-std::sin(azimuth), std::cos(azimuth), 0.0) * points;
+    const double width_m = across.maxCoeff() - across.minCoeff();
+    if (width_m > broadest_m + 1e-3) {
+      broadest_m = width_m;
+      azimuth_deg = degrees;
+    }
+  }
+  return azimuth_deg;
+}
+
+simulation::SequenceParams SequenceOf(const LearnerOptions& options, const simulation::World& world) {
   simulation::SequenceParams params;
   params.seed = params.orbit.seed = options.common.seed;
   params.tell_camera_pose = options.tell_poses;
+  params.orbit.start_azimuth_deg = options.start_azimuth_deg.value_or(BroadestSide_deg(world.Truth().at(0)));
   params.fault.fault = simulation::FaultFromString(options.fault);
   if (options.quick) {
     params.orbit.elevations_deg = {35.0};
@@ -62,9 +81,9 @@ class OrbitRun {
   OrbitRun(const LearnerOptions& options, const learning::LearnerParams& params, const simulation::WorldParams& world,
            std::optional<int> other)
       : options_(options),
-        params_(SequenceOf(options)),
         name_(world.objects.front().name),
         world_(world),
+        params_(SequenceOf(options, world_)),
         sequence_(world_, params_, other),
         trial_(params, name_),
         folder_(options.save.empty() ? fs::path() : fs::path(options.save) / name_) {}
@@ -86,6 +105,7 @@ class OrbitRun {
   Json Result() {
     Json result;
     result["object"] = name_;
+    result["start_azimuth_deg"] = params_.orbit.start_azimuth_deg;
     result["fault"] = options_.fault;
     result.update(FiguresOf(trial_));
     result["points"] = PointFigures(trial_, rendering::SurfaceDistance(world_.MeshOf(0)));
@@ -165,9 +185,9 @@ class OrbitRun {
   }
 
   LearnerOptions options_;
-  simulation::SequenceParams params_;
   std::string name_;
   simulation::SimulatedWorld world_;
+  simulation::SequenceParams params_;
   simulation::OrbitSequence sequence_;
   LearnerTrial trial_;
   fs::path folder_;
@@ -261,6 +281,9 @@ void AddEvaluateLearner(CLI::App& evaluate, Run& run) {
       ->needs(folder);
   verb->add_flag("--no-query-depth", sequence.no_query_depth, "With --sequence: views are placed by their colour images only")
       ->needs(folder);
+  verb->add_option("--start-azimuth", options->start_azimuth_deg,
+                   "Where the camera begins, degrees about z from x (default: before the object's broadest side)")
+      ->type_name("DEG");
   verb->add_flag("--quick", options->quick, "One circle at 10 Hz instead of two at 30");
   verb->add_flag("--tell-poses", options->tell_poses, "The learner is told where the camera is");
   verb->add_option("--save", options->save, "Write frames.csv, views.csv, plot.png (where gnuplot is found) and pictures here")
