@@ -26,6 +26,12 @@ struct History {
   double error_px = 0.0;  // How far the last prediction was off.
 };
 
+// Where depth must not help to place the object in a frame it must not help to refine views either.
+LearnerParams WithoutDepthWhereNotWanted(LearnerParams params) {
+  params.refinement.use_depth &= params.recogniser.use_query_depth;
+  return params;
+}
+
 // A found pose and how it was found.
 struct Found {
   Track track;
@@ -71,7 +77,12 @@ struct Learner::Impl {
   std::vector<segmentation::Cluster> clusters;
 
   Impl(const LearnerParams& p, const std::string& object_name)
-      : params(p), name(object_name), tracker(p), recogniser(p.recogniser), others(p.recogniser), refiner(p) {}
+      : params(WithoutDepthWhereNotWanted(p)),
+        name(object_name),
+        tracker(p),
+        recogniser(p.recogniser),
+        others(p.recogniser),
+        refiner(params) {}
 
   void Adopt(model::ObjectModel changed) {
     object = std::make_shared<const model::ObjectModel>(std::move(changed));
@@ -248,10 +259,19 @@ struct Learner::Impl {
     return track;
   }
 
+  // Whether a pose is where it was searched for. Further away it jumped: what led there is no witness for it.
+  bool IsNear(const rgbd::Frame& frame, const Expectation& expectation, const geometry::Rigid& T_camera_object) const {
+    constexpr double kMaxTurn_rad = 20.0 * M_PI / 180.0;
+    return geometry::Difference(expectation.T_camera_object, T_camera_object).rotation_rad <= kMaxTurn_rad &&
+           LargestShift(*object, frame.camera, expectation.T_camera_object, T_camera_object) <= 2.0 * expectation.margin_px;
+  }
+
   std::optional<Found> Find(const rgbd::Frame& frame) {
     const auto expectation = Expected(frame);
     if (expectation && reference_view >= 0) {
-      if (auto track = Follow(frame, *expectation)) return Found{std::move(*track), true};
+      if (auto track = Follow(frame, *expectation)) {
+        return Found{std::move(*track), IsNear(frame, *expectation, track->T_camera_object)};
+      }
     }
     if (auto track = Relocalise(frame)) return Found{std::move(*track), false};
     return std::nullopt;
@@ -373,11 +393,20 @@ struct Learner::Impl {
 
   // --- New views ---
 
-  bool IsNewDirection(const geometry::Rigid& T_camera_object) const {
-    const Eigen::Vector3d camera = T_camera_object.inverse().translation();
+  bool IsHeld(const rgbd::Frame& frame, const Track& track) const {
+    const auto mount_pose = MountPose(frame);
+    return (track.spread.sigma_m <= params.max_spread_m && track.spread.sigma_rad <= params.max_spread_deg * M_PI / 180.0) ||
+           (mount_pose && tracker.Agree(track.T_camera_object, *mount_pose));
+  }
+
+  // The less of the object is recognised, the nearer to a learned view a new one may be.
+  bool IsNewDirection(const Track& track) const {
+    const Eigen::Vector3d camera = track.T_camera_object.inverse().translation();
+    const double familiar = std::clamp(track.confidence.value / params.new_view_confidence, 0.5, 1.0);
+    const double min_angle_rad = familiar * params.min_view_angle_deg * M_PI / 180.0;
     return std::all_of(object->views.begin(), object->views.end(), [&](const model::View& view) {
       const measures::Viewpoint old = view.viewpoint();
-      return geometry::AngleBetween(camera, old.direction) > params.min_view_angle_deg * M_PI / 180.0 ||
+      return geometry::AngleBetween(camera, old.direction) > min_angle_rad ||
              std::abs(std::log2(camera.norm() / old.distance_m)) > 1.0 / 3.0;
     });
   }
@@ -386,7 +415,8 @@ struct Learner::Impl {
   std::string AddView(const rgbd::Frame& frame, const Track& track, bool pose_is_known) {
     if (track.confidence.value >= params.new_view_confidence) return "well known from here";
     if (!pose_is_known && track.probability < params.min_track_probability) return "not sure enough to learn";
-    if (!pose_is_known && !IsNewDirection(track.T_camera_object)) return "too near to a learned view";
+    if (!pose_is_known && !IsHeld(frame, track)) return "the pose is not held well enough to learn";
+    if (!pose_is_known && !IsNewDirection(track)) return "too near to a learned view";
     if (!Segment(frame)) return "no table plane";
     const int cluster = ClusterOfObject(clusters, *object, track.T_camera_object, frame.camera);
     if (cluster < 0) return "no cluster where the object is";
@@ -430,6 +460,7 @@ struct Learner::Impl {
     result.confidence = track.confidence;
     result.probability = track.probability;
     result.inliers = static_cast<int>(track.matches.size());
+    result.spread = track.spread;
     if (!known_pose && ContradictsMount(frame, track.T_camera_object) && !WasMoved(frame, track)) {
       return Lose(result, "the track contradicts the mount's pose");
     }
@@ -477,10 +508,13 @@ bool Learner::FinishRefinement() {
   // Views may have come in while the last job ran: they are owed one of their own.
   for (impl_->StartRefinement();; impl_->StartRefinement()) {
     const auto refinement = impl_->refiner.Finish();
-    if (!refinement) return changed;
+    if (!refinement) break;
     impl_->TakeEffect(*refinement);
     changed = true;
   }
+  if (!impl_->params.refine || impl_->refiner.views_added() == 0) return changed;
+  impl_->TakeEffect(impl_->refiner.RefineAll(impl_->object, impl_->MountPriors()));
+  return true;
 }
 
 void Learner::SetMeasures(const measures::Measures& measures) {

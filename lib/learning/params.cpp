@@ -21,6 +21,8 @@ void LearnerParams::Check() const {
   require(min_view_angle_deg >= 0.0, "min_view_angle_deg must be >= 0");
   require(surface_samples >= 0, "surface_samples must be >= 0");
   require(surface_views >= 1, "surface_views must be >= 1");
+  require(max_spread_m > 0.0, "max_spread_m must be > 0");
+  require(max_spread_deg > 0.0, "max_spread_deg must be > 0");
   require(neighbour_views >= 0, "neighbour_views must be >= 0");
   require(roi_margin >= 0.0, "roi_margin must be >= 0");
   require(min_roi_margin_px >= 0.0, "min_roi_margin_px must be >= 0");

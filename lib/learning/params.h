@@ -18,8 +18,10 @@ struct LearnerParams {
   double new_view_confidence = 0.6;    // A new view is added when c falls below; (0, 1).
   double min_track_probability = 0.7;  // ...but only with p(o|c) at least this; (0, 1).
   int min_view_points = 20;            // A view needs so many interest points with depth; >= 4.
-  double min_view_angle_deg =
-      10.0;  // A new view differs from every other by so much in direction (or by a third of an octave in distance); >= 0.
+  double min_view_angle_deg = 10.0;    // A new view differs from every other by so much in direction, or by a third of an octave in
+                                       // distance; the lower c, the less, down to half of it; >= 0.
+  double max_spread_m = 0.003;         // ...and a pose that its matches hold this well (object's origin, worst direction); > 0...
+  double max_spread_deg = 0.5;         // ...and its axes; or that agrees with the mount's; > 0.
   // Tracking:
   int neighbour_views = 2;          // Tried beside the reference view when the object is not found against it; >= 0.
   double roi_margin = 0.25;         // Interest points are sought this share of the object's size around where it was; >= 0...

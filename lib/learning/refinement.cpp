@@ -33,7 +33,7 @@ struct Sightings {
   }
 };
 
-pose::BundleProblem ProblemOf(const model::ObjectModel& object, const Sightings& sightings, int first_free_view,
+pose::BundleProblem ProblemOf(const model::ObjectModel& object, const Sightings& sightings, int first_free_view, bool use_depth,
                               const std::vector<std::optional<pose::PosePrior>>& priors) {
   pose::BundleProblem problem;
   for (int v = 0; v < static_cast<int>(object.views.size()); ++v) {
@@ -52,7 +52,9 @@ pose::BundleProblem ProblemOf(const model::ObjectModel& object, const Sightings&
     for (size_t k = 0; k < view.points.size(); ++k) {
       if (!in_play[view.points[k]]) continue;
       const Eigen::Vector2d pixel = PixelOf(view, static_cast<int>(k));
-      problem.observations.push_back({v, view.points[k], pixel, rgbd::DepthAt(view.keyframe, pixel).value_or(0.0)});
+      const bool measured = use_depth || v == 0;
+      problem.observations.push_back(
+          {v, view.points[k], pixel, measured ? rgbd::DepthAt(view.keyframe, pixel).value_or(0.0) : 0.0});
     }
   }
   return problem;
@@ -192,11 +194,12 @@ model::ObjectModel Refined(const model::ObjectModel& object, int first_free_view
   if (!report) report = &own;
   *report = {};
   const Sightings sightings(object);
-  pose::BundleProblem problem = ProblemOf(object, sightings, first_free_view, priors);
+  pose::BundleProblem problem = ProblemOf(object, sightings, first_free_view, params.use_depth, priors);
   pose::BundleParams coarse = params.bundle;
-  if (params.surface_samples > 0) coarse.tolerance *= 10.0;  // It is only where surfaces start from.
+  const bool with_surfaces = params.use_depth && params.surface_samples > 0;
+  if (with_surfaces) coarse.tolerance *= 10.0;  // It is only where surfaces start from.
   report->bundle = pose::AdjustBundle(&problem, coarse);
-  if (params.surface_samples > 0) {
+  if (with_surfaces) {
     problem.relations = SurfaceRelations(object, problem, first_free_view, params);
     const pose::BundleReport points_alone = report->bundle;
     pose::BundleParams fine = params.bundle;

@@ -18,7 +18,8 @@ struct RefinementParams {
   int min_shared_points = 6;           // ...if they share so many; >= 1.
   double independent_samples = 100.0;  // Depths err together: the surface weighs as so many samples at most; > 0.
   double max_surface_move_m =
-      0.008;  // A surface that wants a pair of views further from where points put them is not believed; > 0.
+      0.008;              // A surface that wants a pair of views further from where points put them is not believed; > 0.
+  bool use_depth = true;  // false: only the first view's is used (it gives the scale), all else is pixels.
   double max_link_error_sigmas = 8.0;  // A view that is so far off from a point it is said to see saw another one; > 0.
 
   void Check() const;  // Throws std::invalid_argument naming the field.

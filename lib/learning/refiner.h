@@ -19,6 +19,7 @@ struct Refinement {
   std::shared_ptr<const model::ObjectModel> base;  // What it was made from...
   model::ObjectModel changed;                      // ...and what became of it.
   int closures = 0;                                // Loops that were closed.
+  int dropped = 0;                                 // Views that the others contradict.
 };
 
 class Refiner {
@@ -26,7 +27,11 @@ class Refiner {
   explicit Refiner(const LearnerParams& params) : params_(params) {}
 
   // This view was added: the next job sees whether it closes a loop.
-  void ViewAdded(int view_id) { new_views_.push_back(view_id); }
+  void ViewAdded(int view_id) {
+    new_views_.push_back(view_id);
+    ++views_added_;
+  }
+  int views_added() const { return views_added_; }  // Since the beginning.
 
   // Starts a job for the views added since the last one; does nothing where there are none or a job is under way. `statistics`: one
   // per point. `priors`: where the mount says the object is, by view id.
@@ -38,9 +43,13 @@ class Refiner {
   // The result of the job under way, whatever the frame.
   std::optional<Refinement> Finish() { return job_.Finish(); }
 
+  // All views and points together, here and now.
+  Refinement RefineAll(const std::shared_ptr<const model::ObjectModel>& object, const std::map<int, pose::PosePrior>& priors) const;
+
  private:
   LearnerParams params_;
   std::vector<int> new_views_;  // Ids.
+  int views_added_ = 0;
   Background<Refinement> job_;
 };
 

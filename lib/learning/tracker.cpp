@@ -42,6 +42,20 @@ std::vector<pose::SurfacePoint> SurfaceNear(const model::ObjectModel& object, co
   return surface;
 }
 
+pose::PoseSpread SpreadOf(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
+                          const Track& track) {
+  constexpr double kPixelSigma = 1.0;
+  std::vector<pose::Match2d3d> matches;
+  std::vector<int> all;
+  for (const recognition::GuidedMatch& match : track.matches) {
+    const cv::Point2f& at = features.keypoints[match.keypoint].pt;
+    const Eigen::Vector2d pixel(at.x, at.y);
+    all.push_back(static_cast<int>(matches.size()));
+    matches.push_back({pixel, object.points[match.point].position, rgbd::DepthAt(frame, pixel).value_or(0.0)});
+  }
+  return pose::SpreadOfPose(matches, all, frame.camera, track.T_camera_object, kPixelSigma);
+}
+
 }  // namespace
 
 features::Features Tracker::ExtractAround(const model::ObjectModel& object, const rgbd::Frame& frame,
@@ -97,6 +111,7 @@ Track Tracker::At(const model::ObjectModel& object, const rgbd::Frame& frame, co
   track.T_camera_object = refine ? Refined(object, query, features, guided, mount_pose) : T_camera_object;
   track.confidence = model::ObjectConfidence(object, track.T_camera_object, query, grid, recogniser.confidence);
   track.probability = object.measures.observed.Probability(track.confidence.value);
+  track.spread = SpreadOf(object, query, features, track);
   track.features = features;
   return track;
 }

@@ -8,6 +8,7 @@
 #include "learning/params.h"
 #include "model/confidence.h"
 #include "model/object_model.h"
+#include "pose/refine.h"
 #include "recognition/guided.h"
 
 namespace vantage::learning {
@@ -19,6 +20,7 @@ struct Track {
   std::vector<recognition::GuidedMatch> matches;
   model::Confidence confidence;
   double probability = 0.0;  // p(o|c).
+  pose::PoseSpread spread;   // How well the matches hold the pose.
 };
 
 // Where the object can be in a frame that was not looked at yet.

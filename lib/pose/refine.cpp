@@ -1,6 +1,7 @@
 #include "pose/refine.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -136,6 +137,26 @@ geometry::Rigid RefinePose(const std::vector<Match2d3d>& matches, const std::vec
   return GaussNewton(T_camera_object, iterations, [&](const geometry::Rigid& T, NormalEquations* equations) {
     for (const int i : index) AddMatch(matches[i], camera, T, scale_px, equations);
   });
+}
+
+PoseSpread SpreadOfPose(const std::vector<Match2d3d>& matches, const std::vector<int>& index, const geometry::PinholeCamera& camera,
+                        const geometry::Rigid& T_camera_object, double pixel_sigma) {
+  constexpr double kEveryMatchCounts = 1e6;  // A Cauchy scale, in pixels, at which none is played down.
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  NormalEquations equations;
+  for (const int i : index) {
+    AddMatch(matches[i], camera, T_camera_object, kEveryMatchCounts, &equations);
+  }
+  if (equations.matches < 3) return {kInfinite, kInfinite};
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(equations.hessian);
+  if (!(solver.eigenvalues()(0) > 1e-9 * solver.eigenvalues()(5))) return {kInfinite, kInfinite};
+  const Matrix6d covariance = pixel_sigma * pixel_sigma * equations.hessian.inverse();
+  Eigen::Matrix<double, 3, 6> of_origin;  // How the object's origin moves with a pose's six freedoms.
+  of_origin << Eigen::Matrix3d::Identity(), -Cross(T_camera_object.translation());
+  const auto worst = [](const Eigen::Matrix3d& m) {
+    return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvalues()(2)));
+  };
+  return {worst(of_origin * covariance * of_origin.transpose()), worst(covariance.bottomRightCorner<3, 3>())};
 }
 
 geometry::Rigid RefinePoseOnSurface(const std::vector<Match2d3d>& matches, const std::vector<int>& index,

@@ -20,6 +20,18 @@ geometry::Rigid RefinePose(const std::vector<Match2d3d>& matches, const std::vec
                            const geometry::PinholeCamera& camera, const geometry::Rigid& T_camera_object, double scale_px,
                            int iterations = 10);
 
+// How well matches hold a pose: standard deviations of the object's origin and of its axes in the worst direction.
+struct PoseSpread {
+  double sigma_m = 0.0;
+  double sigma_rad = 0.0;
+};
+
+// Of the pose that the matches `index` agree on, where each is off by `pixel_sigma` in each direction (and by DepthNoise where it
+// has a measured depth). Infinite where they leave a direction open. Few points on a small flat part hold a pose badly, however
+// well they fit.
+PoseSpread SpreadOfPose(const std::vector<Match2d3d>& matches, const std::vector<int>& index, const geometry::PinholeCamera& camera,
+                        const geometry::Rigid& T_camera_object, double pixel_sigma);
+
 // A point of the object's surface; object frame, metres, unit normal outward.
 struct SurfacePoint {
   Eigen::Vector3d point;

@@ -117,6 +117,7 @@ void Fields(Visitor& visit, pose::BundleParams& params) {
 template <typename Visitor>
 void Fields(Visitor& visit, learning::RefinementParams& params) {
   visit.Nested("bundle", params.bundle);
+  visit("use_depth", params.use_depth);
   visit("max_link_error_sigmas", params.max_link_error_sigmas);
 }
 
@@ -160,6 +161,8 @@ void Fields(Visitor& visit, learning::LearnerParams& params) {
   visit("min_track_probability", params.min_track_probability);
   visit("min_view_points", params.min_view_points);
   visit("min_view_angle_deg", params.min_view_angle_deg);
+  visit("max_spread_m", params.max_spread_m);
+  visit("max_spread_deg", params.max_spread_deg);
   visit("neighbour_views", params.neighbour_views);
   visit("roi_margin", params.roi_margin);
   visit("min_roi_margin_px", params.min_roi_margin_px);
