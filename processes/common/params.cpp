@@ -117,6 +117,11 @@ void Fields(Visitor& visit, pose::BundleParams& params) {
 template <typename Visitor>
 void Fields(Visitor& visit, learning::RefinementParams& params) {
   visit.Nested("bundle", params.bundle);
+  visit("surface_samples", params.surface_samples);
+  visit("surface_neighbours", params.surface_neighbours);
+  visit("min_shared_points", params.min_shared_points);
+  visit("independent_samples", params.independent_samples);
+  visit("max_surface_move_m", params.max_surface_move_m);
   visit("use_depth", params.use_depth);
   visit("max_link_error_sigmas", params.max_link_error_sigmas);
 }
