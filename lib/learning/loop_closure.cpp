@@ -294,6 +294,18 @@ std::vector<Link> FindLinks(const model::ObjectModel& object, int view_index, co
   return links;
 }
 
+bool ComesBack(const model::ObjectModel& object, int view, int min_shared) {
+  const std::set<int> own(object.views[view].points.begin(), object.views[view].points.end());
+  long most_older = 0;  // Shared with any view learned before the one at hand.
+  for (int older = 0; older < view; ++older) {
+    const std::vector<int>& points = object.views[older].points;
+    const long shared = std::count_if(points.begin(), points.end(), [&](int point) { return own.count(point) > 0; });
+    if (most_older >= min_shared && 2 * shared < most_older) return true;
+    most_older = std::max(most_older, shared);
+  }
+  return false;
+}
+
 model::ObjectModel Linked(const model::ObjectModel& object, const std::vector<Link>& links) {
   MergedPoints merged(object);
   for (const Link& link : links) merged.Merge(object.views[link.view].points[link.keypoint], link.point);

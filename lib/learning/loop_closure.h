@@ -60,6 +60,11 @@ struct LinkAttempt {
 std::vector<Link> FindLinks(const model::ObjectModel& object, int view, const LoopClosureParams& params,
                             std::vector<LinkAttempt>* attempts = nullptr);
 
+// Whether the view shares points (`min_shared` or more) with an older view but hardly any with one learned between the two: the
+// camera came back, and tracking has linked what it saw again. The loop is known then but its drift is not taken out yet: all views
+// want refining, not the newest alone.
+bool ComesBack(const model::ObjectModel& object, int view, int min_shared = 6);
+
 // The model with linked points merged (the older point stays), unused points gone, indices renewed. A link is left out where some
 // view sees both points at different pixels.
 model::ObjectModel Linked(const model::ObjectModel& object, const std::vector<Link>& links);

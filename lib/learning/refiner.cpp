@@ -46,9 +46,12 @@ struct Job {
     Refinement result;
     result.base = object;
     result.changed = Kept(*object, statistics, params.upkeep);
+    bool came_back = false;
     for (const int id : new_views) {
       const int view = IndexOfView(result.changed, id);
-      if (view < 0 || !params.refinement.use_depth) continue;  // Depth is what tells a true closure from a false one.
+      if (view < 0) continue;
+      came_back |= ComesBack(result.changed, view);
+      if (!params.refinement.use_depth) continue;  // Depth is what tells a true closure from a false one.
       auto closed = WithLoopClosed(result.changed, view, params.loop_closure, params.refinement);
       if (!closed) continue;
       result.changed = std::move(*closed);
@@ -60,7 +63,7 @@ struct Job {
     }
     // A closed loop moves everything, else it is the newest views that are not settled yet.
     const int views = static_cast<int>(result.changed.views.size());
-    const int first_free = result.closures > 0 ? 1 : std::max(1, views - params.refined_views);
+    const int first_free = result.closures > 0 || came_back ? 1 : std::max(1, views - params.refined_views);
     result.changed = Refined(result.changed, first_free, params.refinement, nullptr, PriorsOf(result.changed));
     for (const auto& [id, before] : links) DropContradicted(id, before, &result);
     return result;

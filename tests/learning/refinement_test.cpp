@@ -267,6 +267,15 @@ TEST(LoopClosure, AShiftedPrintIsRefusedByTheSurfaces) {
   EXPECT_GT(attempts[0].surface_conflict, 0.08);
 }
 
+TEST(LoopClosure, AViewThatTrackingLinkedToOldOnesComesBack) {
+  const model::ObjectModel& object = Drifted().object();
+  const int last = static_cast<int>(object.views.size()) - 1;
+  for (int v = 0; v <= last; ++v) EXPECT_FALSE(ComesBack(object, v)) << v;
+  model::ObjectModel linked = Linked(object, FindLinks(object, last, LoopClosureParams{}));
+  EXPECT_TRUE(ComesBack(linked, last));
+  EXPECT_FALSE(ComesBack(linked, last - 8));
+}
+
 TEST(LoopClosure, NeedsDepthAndAView) {
   model::ObjectModel object = Drifted().object();
   const int last = static_cast<int>(object.views.size()) - 1;
