@@ -13,7 +13,7 @@ namespace vantage::recognition {
 
 struct MatchingParams {
   double max_ratio = 0.85;       // All compared: best over second-best descriptor distance, at other places of the object; (0, 1].
-  int exhaustive_points = 8000;  // Up to so many stored interest points all are compared; beyond, those in the tree's leaves; >= 0.
+  int exhaustive_points = 4000;  // Up to so many stored interest points all are compared; beyond, those in the tree's leaves; >= 0.
   int max_candidates = 20;       // By the tree: only so many objects, the most likely, go on; >= 1.
   int paths = 12;                // Leaves of the tree that an interest point looks into; >= 1.
   int neighbours = 10;           // The distance to this many-th place is what a chance match has; >= 2.
