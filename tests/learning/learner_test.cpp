@@ -84,6 +84,46 @@ TEST(Learner, ContinuesAKnownModelWithoutANewOne) {
   EXPECT_GE(second.object()->views.size(), first.object()->views.size());
 }
 
+TEST(Learner, AnObjectMetBeforeIsContinuedAndHasNoTwin) {
+  VANTAGE_NEEDS_DATA("shelf_box");
+  const auto frames = ShelfFrames(3);
+  Learner first(LearnerParams{}, "carton");
+  first.Process(WithoutPose(frames[0]));
+  Learner second(LearnerParams{}, "another");
+  second.SetOthers({first.object()});
+  const LearnerResult result = second.Process(WithoutPose(frames[2]));
+  EXPECT_EQ(second.name(), "carton");
+  EXPECT_TRUE(result.T_camera_object.has_value()) << result.note;
+  ASSERT_NE(second.object(), nullptr);
+  EXPECT_EQ(second.object()->views[0].utime, first.object()->views[0].utime);
+}
+
+// What was found again by recognition alone is learned from only when it is sure, or the next frames have confirmed it.
+TEST(Learner, ConfirmsWhatItFoundAgainBeforeItLearns) {
+  VANTAGE_NEEDS_DATA("shelf_box");
+  const auto frames = ShelfFrames(8);
+  Learner teacher(LearnerParams{}, "carton");
+  teacher.Process(WithoutPose(frames[0]));
+  LearnerParams params;
+  params.sure_probability = 0.999999;  // Recognition alone is never sure.
+  params.confirm_frames = 2;
+  params.min_view_angle_deg = 0.0;  // Every frame would be learned.
+  params.new_view_confidence = 0.999;
+  Learner learner(params, "carton", teacher.object());
+  const size_t views = learner.object()->views.size();
+  std::vector<State> states;
+  for (int i = 2; i < 6; ++i) {
+    const LearnerResult result = learner.Process(WithoutPose(frames[i]));
+    ASSERT_TRUE(result.T_camera_object) << "frame " << i << ": " << result.note;
+    states.push_back(result.state);
+    if (result.state == State::kRelocalising) {
+      EXPECT_EQ(learner.object()->views.size(), views) << "frame " << i;
+    }
+  }
+  EXPECT_EQ(states, (std::vector<State>{State::kRelocalising, State::kRelocalising, State::kTracking, State::kTracking}));
+  EXPECT_GT(learner.object()->views.size(), views);
+}
+
 TEST(Learner, SaysWhyThereIsNothingToLearn) {
   rgbd::Frame frame;
   frame.camera = {64, 48, 50, 50, 31.5, 23.5};

@@ -2,6 +2,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <array>
+#include <cmath>
+#include <random>
+#include <utility>
 
 #include "pose/p3p.h"
 #include "pose/ransac.h"
@@ -151,6 +154,58 @@ TEST(Refine, ASurfaceFindsThePoseAndSaysWhatItDoesNotKnow) {
     }
   }
   EXPECT_EQ(FitSurface({}, frame, geometry::Rigid::Identity(), 100.0).samples, 0);
+}
+
+// Monte Carlo: the spread told is the spread seen, and few points on a small flat part hold a pose badly.
+TEST(SpreadOfPose, TellsHowFarEstimatesScatter) {
+  const geometry::PinholeCamera camera{640, 480, 525, 525, 319.5, 239.5};
+  geometry::Rigid T = geometry::Rigid::Identity();
+  T.translation() = Eigen::Vector3d(0.02, -0.03, 0.7);
+  T.linear() = Eigen::AngleAxisd(0.4, Eigen::Vector3d(0.2, 1, 0.1).normalized()).toRotationMatrix();
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  const auto spread_and_scatter = [&](double width_m, double depth_m) {
+    std::vector<Match2d3d> truth;
+    std::vector<int> all;
+    for (int i = 0; i < 60; ++i) {
+      const Eigen::Vector3d point(width_m * uniform(random), 0.1 * uniform(random), depth_m * uniform(random));
+      truth.push_back({*camera.Project(T * point), point, 0.0});
+      all.push_back(i);
+    }
+    double sum_m = 0.0, sum_rad = 0.0;
+    constexpr int kRuns = 200;
+    for (int run = 0; run < kRuns; ++run) {
+      std::vector<Match2d3d> noisy = truth;
+      for (Match2d3d& match : noisy) match.pixel += Eigen::Vector2d(normal(random), normal(random));
+      const geometry::PoseDifference error = geometry::Difference(RefinePose(noisy, all, camera, T, 50.0), T);
+      sum_m += error.translation_m * error.translation_m;
+      sum_rad += error.rotation_rad * error.rotation_rad;
+    }
+    return std::pair(SpreadOfPose(truth, all, camera, T, 1.0), PoseSpread{std::sqrt(sum_m / kRuns), std::sqrt(sum_rad / kRuns)});
+  };
+  const auto [held, held_scatter] = spread_and_scatter(0.08, 0.05);
+  // The worst direction carries most of the scatter, never more than all of it.
+  EXPECT_LT(held.sigma_m, 1.2 * held_scatter.sigma_m);
+  EXPECT_GT(held.sigma_m, 0.6 * held_scatter.sigma_m);
+  EXPECT_LT(held.sigma_rad, 1.2 * held_scatter.sigma_rad);
+  EXPECT_GT(held.sigma_rad, 0.6 * held_scatter.sigma_rad);
+  const auto [loose, loose_scatter] = spread_and_scatter(0.015, 0.0);
+  EXPECT_GT(loose.sigma_rad, 3.0 * held.sigma_rad);
+  EXPECT_GT(loose_scatter.sigma_rad, 3.0 * held_scatter.sigma_rad);
+}
+
+TEST(SpreadOfPose, IsInfiniteWhereADirectionIsOpen) {
+  const geometry::PinholeCamera camera{640, 480, 525, 525, 319.5, 239.5};
+  geometry::Rigid T = geometry::Rigid::Identity();
+  T.translation().z() = 0.7;
+  std::vector<Match2d3d> line;
+  for (int i = 0; i < 10; ++i) {
+    const Eigen::Vector3d point(0.01 * i, 0.0, 0.0);
+    line.push_back({*camera.Project(T * point), point, 0.0});
+  }
+  EXPECT_FALSE(std::isfinite(SpreadOfPose(line, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, camera, T, 1.0).sigma_rad));
+  EXPECT_FALSE(std::isfinite(SpreadOfPose(line, {0, 1}, camera, T, 1.0).sigma_m));
 }
 
 }  // namespace
