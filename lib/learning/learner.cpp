@@ -147,7 +147,7 @@ struct Learner::Impl {
     if (other_objects.empty()) return false;
     for (const recognition::Detection& detection : others.Recognise(frame, others.Extract(frame))) {
       const auto& other = other_objects.at(detection.object);
-      if (detection.probability < params.sure_probability) continue;
+      if (detection.probability < params.min_track_probability) continue;
       if (ClusterOfObject(clusters, *other, detection.T_camera_object, frame.camera) != cluster) continue;
       name = detection.object;
       Adopt(*other);

@@ -91,7 +91,7 @@ TEST(Learner, AnObjectMetBeforeIsContinuedAndHasNoTwin) {
   first.Process(WithoutPose(frames[0]));
   Learner second(LearnerParams{}, "another");
   second.SetOthers({first.object()});
-  const LearnerResult result = second.Process(WithoutPose(frames[2]));
+  const LearnerResult result = second.Process(WithoutPose(frames[1]), {Eigen::Vector2d(200, 320)});
   EXPECT_EQ(second.name(), "carton");
   EXPECT_TRUE(result.T_camera_object.has_value()) << result.note;
   ASSERT_NE(second.object(), nullptr);
