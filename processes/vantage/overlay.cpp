@@ -1,6 +1,9 @@
 #include "vantage/overlay.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
@@ -8,15 +11,20 @@
 namespace vantage::cli {
 namespace {
 
-// Bright, and far apart for most pairs of names.
-cv::Scalar ColorOf(const std::string& name) {
-  unsigned hash = 2166136261u;
-  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619u;
-  const cv::Mat hsv(1, 1, CV_8UC3, cv::Scalar(hash % 180, 200, 255));
-  cv::Mat bgr;
-  cv::cvtColor(hsv, bgr, cv::COLOR_HSV2BGR);
-  const cv::Vec3b color = bgr.at<cv::Vec3b>(0, 0);
-  return cv::Scalar(color[0], color[1], color[2]);
+// Bright colours, one per object: a turn by the golden angle from each to the next, so that even many are told apart.
+std::map<std::string, cv::Scalar> ColorsOf(const std::vector<recognition::Detection>& detections) {
+  std::map<std::string, cv::Scalar> colors;
+  for (const recognition::Detection& detection : detections) colors[detection.object] = cv::Scalar();
+  double turn = 0.0;
+  for (auto& [name, color] : colors) {
+    const cv::Mat hsv(1, 1, CV_8UC3, cv::Scalar(std::floor(180.0 * turn), 200, 255));
+    cv::Mat bgr;
+    cv::cvtColor(hsv, bgr, cv::COLOR_HSV2BGR);
+    const cv::Vec3b pixel = bgr.at<cv::Vec3b>(0, 0);
+    color = cv::Scalar(pixel[0], pixel[1], pixel[2]);
+    turn = std::fmod(turn + 0.381966, 1.0);
+  }
+  return colors;
 }
 
 void PutLabel(const std::string& text, cv::Point centre, const cv::Scalar& color, cv::Mat* picture) {
@@ -32,6 +40,7 @@ void PutLabel(const std::string& text, cv::Point centre, const cv::Scalar& color
 }  // namespace
 
 cv::Mat DrawDetections(const rgbd::Frame& frame, const std::vector<recognition::Detection>& detections) {
+  const std::map<std::string, cv::Scalar> colors = ColorsOf(detections);
   cv::Mat picture = frame.color.clone();
   std::vector<std::vector<cv::Point>> hulls;
   for (const recognition::Detection& detection : detections) {
@@ -42,12 +51,12 @@ cv::Mat DrawDetections(const rgbd::Frame& frame, const std::vector<recognition::
   }
   cv::Mat filled = picture.clone();
   for (size_t i = 0; i < detections.size(); ++i) {
-    if (hulls[i].size() >= 3) cv::fillConvexPoly(filled, hulls[i], ColorOf(detections[i].object), cv::LINE_AA);
+    if (hulls[i].size() >= 3) cv::fillConvexPoly(filled, hulls[i], colors.at(detections[i].object), cv::LINE_AA);
   }
   cv::addWeighted(filled, 0.35, picture, 0.65, 0.0, picture);
   for (size_t i = 0; i < detections.size(); ++i) {
     const recognition::Detection& detection = detections[i];
-    const cv::Scalar color = ColorOf(detection.object);
+    const cv::Scalar color = colors.at(detection.object);
     if (hulls[i].size() >= 2) cv::polylines(picture, hulls[i], true, color, 2, cv::LINE_AA);
     for (const Eigen::Vector2d& pixel : detection.inlier_pixels) {
       cv::circle(picture, {cvRound(pixel.x()), cvRound(pixel.y())}, 1, color, cv::FILLED, cv::LINE_AA);

@@ -10,7 +10,7 @@
 namespace vantage::cli {
 
 // The frame's picture with the convex hull of every detection's matched interest points laid over it (Figure 4 of the paper), its
-// object's name and p(o|c). Colours follow from the names.
+// object's name and p(o|c). Every object has a colour of its own.
 cv::Mat DrawDetections(const rgbd::Frame& frame, const std::vector<recognition::Detection>& detections);
 
 // Throws std::runtime_error where the file cannot be written.
