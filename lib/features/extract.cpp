@@ -4,11 +4,14 @@
 #include <stdexcept>
 
 #include "features/features.h"
+#include "features/surf.h"
 
 namespace vantage::features {
 namespace {
 
-constexpr int kMaskMargin = 24;  // Pixels around the mask's bounding box, so that blobs at its border keep their surroundings.
+// Pixels around the mask's bounding box, so that blobs at its border keep their surroundings. SURF describes a point by all within
+// 16 times its scale.
+int MaskMargin(const FeatureParams& params) { return params.type == "surf" ? 64 : 24; }
 
 // RootSIFT (Arandjelovic and Zisserman, 2012): Euclidean distance then compares histograms by the Hellinger kernel.
 void RootNormalise(cv::Mat* descriptors) {
@@ -21,11 +24,20 @@ void RootNormalise(cv::Mat* descriptors) {
   }
 }
 
-cv::Rect WorkingArea(const cv::Mat& gray, const cv::Mat& mask) {
+cv::Rect WorkingArea(const cv::Mat& gray, const cv::Mat& mask, int margin) {
   const cv::Rect image(0, 0, gray.cols, gray.rows);
   if (mask.empty()) return image;
   const cv::Rect box = cv::boundingRect(mask);
-  return cv::Rect(box.x - kMaskMargin, box.y - kMaskMargin, box.width + 2 * kMaskMargin, box.height + 2 * kMaskMargin) & image;
+  return cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) & image;
+}
+
+Features ExtractSift(const cv::Mat& gray, const cv::Mat& mask, const FeatureParams& params) {
+  Features features;
+  const cv::Ptr<cv::SIFT> sift = cv::SIFT::create(params.max_keypoints, 3, params.contrast_threshold);
+  sift->detectAndCompute(gray, mask, features.keypoints, features.descriptors);
+  if (features.descriptors.empty()) features.descriptors = cv::Mat(0, 128, CV_32F);
+  RootNormalise(&features.descriptors);
+  return features;
 }
 
 }  // namespace
@@ -34,7 +46,7 @@ void FeatureParams::Check() const {
   const auto require = [](bool ok, const std::string& what) {
     if (!ok) throw std::invalid_argument("features: " + what);
   };
-  require(type == "sift", "type must be \"sift\", is \"" + type + "\"");
+  require(type == "sift" || type == "surf", "type must be \"sift\" or \"surf\", is \"" + type + "\"");
   require(max_keypoints >= 1, "max_keypoints must be >= 1, is " + std::to_string(max_keypoints));
   require(contrast_threshold > 0.0, "contrast_threshold must be > 0, is " + std::to_string(contrast_threshold));
 }
@@ -48,14 +60,11 @@ Features Extract(const cv::Mat& gray, const cv::Mat& mask, const FeatureParams& 
   if (!mask.empty() && (mask.type() != CV_8UC1 || mask.size() != gray.size())) {
     throw std::invalid_argument("features: the mask must be CV_8UC1 and as large as the image");
   }
-  Features features;
-  if (!mask.empty() && cv::countNonZero(mask) == 0) return features;
-  const cv::Rect area = WorkingArea(gray, mask);
-  const cv::Ptr<cv::SIFT> sift = cv::SIFT::create(params.max_keypoints, 3, params.contrast_threshold);
-  sift->detectAndCompute(gray(area), mask.empty() ? cv::Mat() : mask(area), features.keypoints, features.descriptors);
+  if (!mask.empty() && cv::countNonZero(mask) == 0) return Features();
+  const cv::Rect area = WorkingArea(gray, mask, MaskMargin(params));
+  const cv::Mat inside = mask.empty() ? cv::Mat() : mask(area);
+  Features features = params.type == "surf" ? ExtractSurf(gray(area), inside, params) : ExtractSift(gray(area), inside, params);
   for (cv::KeyPoint& keypoint : features.keypoints) keypoint.pt += cv::Point2f(area.x, area.y);
-  if (features.descriptors.empty()) features.descriptors = cv::Mat(0, 128, CV_32F);
-  RootNormalise(&features.descriptors);
   return features;
 }
 

@@ -8,9 +8,10 @@
 namespace vantage::features {
 
 struct FeatureParams {
-  std::string type = "sift";         // "sift" (OpenCV, square-rooted to RootSIFT).
+  std::string type = "sift";         // "sift" (OpenCV, square-rooted to RootSIFT, 128 values) or "surf" (dlib, 64 values).
   int max_keypoints = 3000;          // Strongest kept per image; >= 1.
-  double contrast_threshold = 0.02;  // SIFT's; lower finds more and weaker points; > 0.
+  double contrast_threshold = 0.02;  // Of SIFT's extrema, and of the blobs that SURF sees: share of the grey range; lower finds
+                                     // more and weaker points; > 0.
 
   void Check() const;               // Throws std::invalid_argument naming the field.
   std::string Fingerprint() const;  // Equal where descriptors and repeatability are comparable.
@@ -24,7 +25,8 @@ struct Features {
 };
 
 // Detects and describes. `mask` (CV_8UC1, empty = everywhere) restricts the points; the work is done only in its bounding box plus
-// a margin. Order: as the detector gives them (deterministic). Cost: about 160 ms for 512 x 384 and 1000 points on one thread.
+// a margin. Order: as the detector gives them (deterministic). Cost: about 160 ms (SURF 60) for 512 x 384 and 1000 points on one
+// thread.
 Features Extract(const cv::Mat& gray, const cv::Mat& mask, const FeatureParams& params);
 
 // The rows `index` of a set.

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
@@ -66,11 +68,20 @@ TEST(NearestTwo, NothingToMatchIsNoMatch) {
   EXPECT_THROW(NearestTwo(RandomUnitRows(2, 128, 1), RandomUnitRows(2, 64, 1)), std::invalid_argument);
 }
 
-TEST(Extract, AMovedImageMovesItsPointsAndKeepsTheirDescriptors) {
+FeatureParams OfType(const std::string& type) {
+  FeatureParams params;
+  params.type = type;
+  return params;
+}
+
+class ExtractOf : public ::testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Types, ExtractOf, ::testing::Values("sift", "surf"), [](const auto& type) { return type.param; });
+
+TEST_P(ExtractOf, AMovedImageMovesItsPointsAndKeepsTheirDescriptors) {
   const cv::Mat image = Blobs(3);
   cv::Mat moved(image.size(), CV_8UC1, cv::Scalar(128));
   image(cv::Rect(0, 0, 300, 225)).copyTo(moved(cv::Rect(20, 15, 300, 225)));
-  const Features a = Extract(image, {}, {}), b = Extract(moved, {}, {});
+  const Features a = Extract(image, {}, OfType(GetParam())), b = Extract(moved, {}, OfType(GetParam()));
   ASSERT_GT(a.size(), 50);
   int moved_right = 0;
   const auto matches = MatchRatio(a.descriptors, b.descriptors, 0.8);
@@ -79,27 +90,95 @@ TEST(Extract, AMovedImageMovesItsPointsAndKeepsTheirDescriptors) {
     moved_right += std::abs(shift.x - 20) < 1 && std::abs(shift.y - 15) < 1;
   }
   EXPECT_GT(matches.size(), 30u);
-  EXPECT_GT(moved_right, 0.95 * matches.size());
+  EXPECT_GT(moved_right, 0.9 * matches.size());
 }
 
-TEST(Extract, TheMaskRestrictsThePointsInImageCoordinates) {
+// Half as large and turned by 30 degrees: sizes halve, angles turn the same way, for votes rely on both.
+TEST_P(ExtractOf, SizesAndAnglesFollowTheImage) {
+  cv::Mat image;
+  cv::resize(Blobs(6), image, cv::Size(), 3, 3, cv::INTER_CUBIC);
+  const cv::Point2f centre(image.cols / 2.f, image.rows / 2.f);
+  const cv::Mat warp = cv::getRotationMatrix2D(centre, 30.0, 0.5);
+  cv::Mat turned;
+  cv::warpAffine(image, turned, warp, image.size(), cv::INTER_AREA, cv::BORDER_CONSTANT, 128);
+  const Features a = Extract(image, {}, OfType(GetParam())), b = Extract(turned, {}, OfType(GetParam()));
+  int matches = 0, right = 0;
+  for (const Match& match : MatchRatio(a.descriptors, b.descriptors, 0.8)) {
+    const cv::KeyPoint &from = a.keypoints[match.query], &to = b.keypoints[match.train];
+    const cv::Mat at = warp * (cv::Mat_<double>(3, 1) << from.pt.x, from.pt.y, 1.0);
+    if (std::hypot(at.at<double>(0) - to.pt.x, at.at<double>(1) - to.pt.y) > 2.0) continue;
+    ++matches;
+    const double turn = std::remainder(to.angle - from.angle + 30.0, 360.0);  // OpenCV turns images against the clock.
+    right += std::abs(turn) < 15.0 && to.size / from.size > 0.4 && to.size / from.size < 0.63;
+  }
+  EXPECT_GT(matches, 30);
+  EXPECT_GT(right, 0.9 * matches);
+}
+
+TEST_P(ExtractOf, TheMaskRestrictsThePointsInImageCoordinates) {
   const cv::Mat image = Blobs(4);
   cv::Mat mask = cv::Mat::zeros(image.size(), CV_8UC1);
   const cv::Rect area(150, 80, 90, 70);
   mask(area).setTo(255);
-  const Features masked = Extract(image, mask, {});
+  const Features whole = Extract(image, {}, OfType(GetParam())), masked = Extract(image, mask, OfType(GetParam()));
   ASSERT_GT(masked.size(), 5);
-  for (const cv::KeyPoint& keypoint : masked.keypoints) EXPECT_TRUE(area.contains(keypoint.pt)) << keypoint.pt;
-  EXPECT_EQ(Extract(image, cv::Mat::zeros(image.size(), CV_8UC1), {}).size(), 0);
+  int of_whole = 0;
+  for (const cv::KeyPoint& keypoint : masked.keypoints) {
+    EXPECT_TRUE(area.contains(keypoint.pt)) << keypoint.pt;
+    of_whole += std::any_of(whole.keypoints.begin(), whole.keypoints.end(),
+                            [&](const cv::KeyPoint& other) { return cv::norm(other.pt - keypoint.pt) < 0.5; });
+  }
+  EXPECT_GT(of_whole, 0.8 * masked.size());
+  EXPECT_EQ(Extract(image, cv::Mat::zeros(image.size(), CV_8UC1), OfType(GetParam())).size(), 0);
 }
 
-TEST(Extract, FlatAndWrongImages) {
-  EXPECT_EQ(Extract(cv::Mat::zeros(100, 100, CV_8UC1), {}, {}).size(), 0);
-  EXPECT_THROW(Extract(cv::Mat(), {}, {}), std::invalid_argument);
-  EXPECT_THROW(Extract(cv::Mat::zeros(10, 10, CV_8UC3), {}, {}), std::invalid_argument);
+// What a caller that looks into a region of interest turns: fainter points, or fewer of them.
+TEST_P(ExtractOf, TheThresholdSaysHowFaintPointsMayBeAndTheStrongestAreKept) {
+  cv::Mat faint;
+  Blobs(8).convertTo(faint, CV_8UC1, 0.1, 115.0);
+  FeatureParams params = OfType(GetParam());
+  const int few = Extract(faint, {}, params).size();
+  params.contrast_threshold /= 5.0;
+  const Features many = Extract(faint, {}, params);
+  EXPECT_GT(many.size(), few + 30);
+  params.max_keypoints = 20;
+  const Features strongest = Extract(faint, {}, params);
+  ASSERT_GE(strongest.size(), 20);
+  ASSERT_LE(strongest.size(), 22);  // SIFT keeps equals.
+  std::vector<float> responses;
+  for (const cv::KeyPoint& keypoint : many.keypoints) responses.push_back(keypoint.response);
+  std::sort(responses.rbegin(), responses.rend());
+  for (const cv::KeyPoint& keypoint : strongest.keypoints) EXPECT_GE(keypoint.response, responses[19]) << keypoint.pt;
+}
+
+TEST_P(ExtractOf, IsTheSameOnOneThreadAndOfUnitLength) {
+  const Features many = Extract(Blobs(7), {}, OfType(GetParam()));
+  const int threads = cv::getNumThreads();
+  cv::setNumThreads(1);
+  const Features one = Extract(Blobs(7), {}, OfType(GetParam()));
+  cv::setNumThreads(threads);
+  ASSERT_EQ(many.size(), one.size());
+  EXPECT_EQ(cv::norm(many.descriptors, one.descriptors, cv::NORM_INF), 0.0);
+  for (int k = 0; k < many.size(); ++k) {
+    EXPECT_EQ(many.keypoints[k].pt, one.keypoints[k].pt);
+    EXPECT_NEAR(cv::norm(many.descriptors.row(k)), 1.0, 1e-3);
+  }
+}
+
+TEST_P(ExtractOf, FlatAndWrongImages) {
+  const FeatureParams params = OfType(GetParam());
+  EXPECT_EQ(Extract(cv::Mat::zeros(100, 100, CV_8UC1), {}, params).size(), 0);
+  EXPECT_EQ(Extract(cv::Mat(1, 3, CV_8UC1, cv::Scalar(7)), {}, params).size(), 0);
+  EXPECT_THROW(Extract(cv::Mat(), {}, params), std::invalid_argument);
+  EXPECT_THROW(Extract(cv::Mat::zeros(10, 10, CV_8UC3), {}, params), std::invalid_argument);
+}
+
+TEST(FeatureParams, NamesWhatIsWrongAndToldApart) {
+  EXPECT_THROW(OfType("orb").Check(), std::invalid_argument);
   FeatureParams params;
-  params.type = "surf";
+  params.contrast_threshold = 0.0;
   EXPECT_THROW(params.Check(), std::invalid_argument);
+  EXPECT_NE(OfType("sift").Fingerprint(), OfType("surf").Fingerprint());
 }
 
 }  // namespace
