@@ -11,6 +11,7 @@ void AddEvaluate(CLI::App& app, Run& run) {
   verb->set_version_flag("--version", "vantage " VANTAGE_VERSION);
   AddEvaluateLearner(*verb, run);
   AddEvaluateRecogniser(*verb, run);
+  AddEvaluateSegmentation(*verb, run);
 }
 
 }  // namespace vantage::cli

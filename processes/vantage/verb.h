@@ -36,6 +36,7 @@ void AddEvaluate(CLI::App& app, Run& run);
 // The parts of `evaluate`.
 void AddEvaluateLearner(CLI::App& evaluate, Run& run);
 void AddEvaluateRecogniser(CLI::App& evaluate, Run& run);
+void AddEvaluateSegmentation(CLI::App& evaluate, Run& run);
 void AddVocabulary(CLI::App& app, Run& run);
 
 // --seed, --json, --config and --version.

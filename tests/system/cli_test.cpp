@@ -95,8 +95,8 @@ class Cli : public ::testing::Test {
 };
 
 TEST_F(Cli, HelpAndVersionOfEveryVerb) {
-  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "evaluate learner", "evaluate recogniser", "models list",
-                           "models show", "vocabulary train", "vocabulary show"}) {
+  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "evaluate learner", "evaluate recogniser",
+                           "evaluate segmentation", "models list", "models show", "vocabulary train", "vocabulary show"}) {
     SCOPED_TRACE(verb);
     const Outcome help = Run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
@@ -296,6 +296,27 @@ TEST_F(Cli, TheRecogniserIsHeldAgainstATable) {
   EXPECT_EQ(Json::parse(absent.out)["absent"]["frames"], 3);
   EXPECT_EQ(Json::parse(absent.out)["absent"]["objects"], 4);
   EXPECT_EQ(Json::parse(absent.out)["absent"]["detections"], 0);
+}
+
+TEST_F(Cli, SegmentationIsHeldAgainstLabelsAndThePlainMethod) {
+  const fs::path bare = MakeScene("bare");
+  ExpectRefused("evaluate segmentation --sequence bare", "vantage evaluate segmentation", {"bare", "label"});
+  VANTAGE_NEEDS_DATA("osd");
+  const Outcome outcome =
+      Run("evaluate segmentation --sequence '" + (testing::DataFolder() / "osd").string() + "' --save pictures --json -");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json figures = Json::parse(outcome.out);
+  const Json &apart = figures.at("apart"), &rest = figures.at("rest");
+  EXPECT_EQ(apart.at("clusters").at("objects"), 38);
+  EXPECT_EQ(apart.at("clusters").at("found"), 38);
+  EXPECT_EQ(rest.at("clusters").at("images"), 28);
+  EXPECT_GE(rest.at("clusters").at("found").get<int>(), 36) << rest;
+  EXPECT_GT(rest.at("clusters").at("found").get<int>(), rest.at("plain").at("found").get<int>());
+  for (const char* sum : {"images", "objects", "found"}) {
+    EXPECT_EQ(rest.at("clusters").at(sum).get<int>(),
+              figures.at("rest_even").at("clusters").at(sum).get<int>() + figures.at("rest_odd").at("clusters").at(sum).get<int>());
+  }
+  EXPECT_EQ(cv::imread((folder_ / "pictures" / "000044.png").string()).size(), cv::Size(3 * 640, 480));
 }
 
 TEST_F(Cli, AVocabularyIsTrainedAndShown) {
