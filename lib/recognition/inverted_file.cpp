@@ -11,7 +11,9 @@ namespace {
 
 constexpr double kWeightStep = 0.02;      // ln N_i that is out by less is not worth a walk over the leaf.
 constexpr float kCodeScale = 127 / 0.7f;  // Unit descriptors of 64 or 128 values hardly hold a value beyond 0.7.
-constexpr int kTrainingSample = 128;      // Rows a cluster that k-means looks at (KMeansParams), for the cost of a split.
+constexpr std::size_t kLeavesAhead = 6;   // Whose ends are fetched from memory while a view's points go into earlier ones.
+constexpr int kUrgent = 4;  // A leaf that came to hold so many times too many is split before others, or it would take long.
+constexpr int kTrainingSample = 128;  // Rows a cluster that k-means looks at (KMeansParams), for the cost of a split.
 
 // 8 bits a value, rounded.
 template <typename Code>
@@ -92,14 +94,27 @@ void InvertedFile::Slot::Add(double sign, double frequency, double l) {
   m2l2 += sign * frequency * frequency * l * l;
 }
 
+void InvertedFile::Slot::Reweigh(double frequency, double step, double square_step) {
+  ml += frequency * step;
+  m2l += frequency * frequency * step;
+  m2l2 += frequency * frequency * square_step;
+}
+
 void InvertedFile::UpdateWeight(Leaf& leaf) {
   const double log_objects = leaf.holders.empty() ? 0.0 : std::log(leaf.holders.size());
   const bool stopped = static_cast<int>(leaf.points.size()) > params_.stop_leaf_points;
   if (stopped == leaf.stopped && std::abs(log_objects - leaf.log_objects) < kWeightStep) return;
-  Contribute(leaf, -1.0);
+  if (stopped || leaf.stopped) {
+    Contribute(leaf, -1.0);
+    leaf.log_objects = log_objects;
+    leaf.stopped = stopped;
+    Contribute(leaf, 1.0);
+    return;
+  }
+  const double step = log_objects - leaf.log_objects;
+  const double square_step = log_objects * log_objects - leaf.log_objects * leaf.log_objects;
+  ForEachRun(leaf, [&](int index, int frequency) { slots_[index].Reweigh(frequency, step, square_step); });
   leaf.log_objects = log_objects;
-  leaf.stopped = stopped;
-  Contribute(leaf, 1.0);
 }
 
 void InvertedFile::CountHolder(Leaf& leaf, int object, int points) {
@@ -114,18 +129,29 @@ void InvertedFile::CountHolder(Leaf& leaf, int object, int points) {
 
 void InvertedFile::Insert(int index, int slot, const int* keypoints, int count, const cv::Mat& descriptors) {
   Leaf& leaf = leaves_[index];
-  std::vector<std::int8_t> code(descriptors.cols);
   for (int i = 0; i < count; ++i) {
     leaf.points.push_back({slot, keypoints[i]});
-    Encode(descriptors.ptr<float>(keypoints[i]), descriptors.cols, code.data());
-    leaf.codes.insert(leaf.codes.end(), code.begin(), code.end());
+    leaf.codes.resize(leaf.codes.size() + descriptors.cols);
+    Encode(descriptors.ptr<float>(keypoints[i]), descriptors.cols, leaf.codes.data() + leaf.codes.size() - descriptors.cols);
   }
   if (!leaf.stopped) slots_[slot].Add(1.0, count, leaf.log_objects);
   CountHolder(leaf, slots_[slot].object, count);
   UpdateWeight(leaf);
-  const int split_at = std::max(leaf.split_at, params_.max_leaf_points);
+  if (params_.max_leaf_points == 0) return;
+  const int split_at = std::max(leaf.split_at, params_.max_leaf_points), urgent_at = kUrgent * split_at;
   const int size = static_cast<int>(leaf.points.size());
-  if (params_.max_leaf_points > 0 && size > split_at && size - count <= split_at) overfull_.push_back(index);
+  if (size > urgent_at && size - count <= urgent_at) {
+    overfull_.push_front(index);
+  } else if (size > split_at && size - count <= split_at) {
+    overfull_.push_back(index);
+  }
+}
+
+// Asks the memory for what Insert will write to.
+void InvertedFile::FetchEnds(const Leaf& leaf) {
+  __builtin_prefetch(leaf.points.data() + leaf.points.size(), 1);
+  __builtin_prefetch(leaf.codes.data() + leaf.codes.size(), 1);
+  __builtin_prefetch(leaf.holders.data() + leaf.holders.size() / 2);
 }
 
 void InvertedFile::SetView(int object, int view, const cv::Mat& descriptors) {
@@ -151,6 +177,7 @@ void InvertedFile::SetView(int object, int view, const cv::Mat& descriptors) {
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return words.leaves[a] < words.leaves[b]; });
   for (std::size_t start = 0, end = 0; start < order.size(); start = end) {
     const int leaf = words.leaves[order[start]];
+    if (start + kLeavesAhead < order.size()) FetchEnds(leaves_[words.leaves[order[start + kLeavesAhead]]]);
     while (end < order.size() && words.leaves[order[end]] == leaf) ++end;
     Insert(leaf, index, order.data() + start, static_cast<int>(end - start), descriptors);
   }
@@ -214,15 +241,30 @@ bool InvertedFile::Refine(int distances) {
   return false;
 }
 
+// Descriptors of the leaf's points first, first + step, ...; at most `count`.
+cv::Mat InvertedFile::Decode(const Leaf& leaf, int first, int step, int count) const {
+  const int length = tree_.length(), points = static_cast<int>(leaf.points.size());
+  cv::Mat rows(std::max(0, std::min(count, (points - first + step - 1) / step)), length, CV_32F);
+  for (int r = 0; r < rows.rows; ++r) {
+    const std::int8_t* code = leaf.codes.data() + (static_cast<std::size_t>(first) + static_cast<std::size_t>(r) * step) * length;
+    float* row = rows.ptr<float>(r);
+    for (int i = 0; i < length; ++i) row[i] = code[i] / kCodeScale;
+  }
+  return rows;
+}
+
 void InvertedFile::SplitLeaf(int number) {
   const int length = tree_.length(), points = static_cast<int>(leaves_[number].points.size());
-  cv::Mat rows(points, length, CV_32F);
-  const std::int8_t* codes = leaves_[number].codes.data();
-  for (std::size_t i = 0; i < rows.total(); ++i) rows.ptr<float>(0)[i] = codes[i] / kCodeScale;
-  const std::vector<int> parts = tree_.Split(number, rows);
-  if (parts.empty()) {
+  const int looked_at = tree_.params().branching * kTrainingSample;
+  const int node = tree_.Split(number, Decode(leaves_[number], 0, (points + looked_at - 1) / looked_at, looked_at));
+  if (node < 0) {
     leaves_[number].split_at = 2 * points;  // They are alike: not again before there are many others.
     return;
+  }
+  std::vector<int> parts;
+  for (int first = 0; first < points; first += looked_at) {
+    const std::vector<int> some = tree_.LeavesUnder(node, Decode(leaves_[number], first, 1, looked_at));
+    parts.insert(parts.end(), some.begin(), some.end());
   }
   Contribute(leaves_[number], -1.0);
   const Leaf old = std::move(leaves_[number]);
@@ -246,6 +288,12 @@ void InvertedFile::SplitLeaf(int number) {
     Contribute(leaf, 1.0);
     if (static_cast<int>(leaf.points.size()) > params_.max_leaf_points) overfull_.push_back(part);
   }
+}
+
+int InvertedFile::LargestLeaf() const {
+  std::size_t most = 0;
+  for (const Leaf& leaf : leaves_) most = std::max(most, leaf.points.size());
+  return static_cast<int>(most);
 }
 
 std::vector<Ranked> InvertedFile::Rank(const Words& words, int count, int paths) const {

@@ -50,9 +50,11 @@ class InvertedFile {
   int views() const { return view_count_; }
   std::size_t points() const { return point_count_; }
   std::size_t memory_bytes() const;  // Beside the tree's.
+  int LargestLeaf() const;           // Points in it. Cost: linear in the leaves.
 
   // Adds the view or replaces what was there, then refines the tree. Keypoint k is row k. Throws std::invalid_argument where the
-  // rows are not ours or a number is negative. Cost: branching x depth distances a row, and the refinement's.
+  // rows are not ours or a number is negative. Cost: branching x depth distances a row, and the refinement's: params'
+  // refine_distances, or one split, which looks at branching x 128 points and moves those that the leaf got since it was overfull.
   void SetView(int object, int view, const cv::Mat& descriptors);
   void RemoveView(int object, int view);  // Nothing where there is none.
   void RemoveObject(int object);
@@ -94,6 +96,7 @@ class InvertedFile {
     double m = 0.0, ml = 0.0, m2 = 0.0, m2l = 0.0, m2l2 = 0.0;
 
     void Add(double sign, double frequency, double l);
+    void Reweigh(double frequency, double step, double square_step);  // Of l and l^2.
   };
 
   double LogDocuments() const;
@@ -102,8 +105,10 @@ class InvertedFile {
   static void ForEachRun(const Leaf& leaf, const Visitor& visit);
   void Contribute(const Leaf& leaf, double sign);
   void Insert(int leaf, int slot, const int* keypoints, int count, const cv::Mat& descriptors);
+  static void FetchEnds(const Leaf& leaf);
   void UpdateWeight(Leaf& leaf);
   void SplitLeaf(int leaf);
+  cv::Mat Decode(const Leaf& leaf, int first, int step, int count) const;
   int SplitCost(const Leaf& leaf) const;
   void CountHolder(Leaf& leaf, int object, int points);
   void RemoveSlot(int slot);

@@ -183,12 +183,53 @@ void Offer(std::vector<Reached>& best, std::size_t most, const Reached& candidat
 
 }  // namespace
 
+// One path: level by level, rows at one node together, so that its centroids are fetched once for all of them.
+void VocabularyTree::FollowNearest(const cv::Mat& descriptors, int* leaves) const {
+  struct Walker {
+    int node, row;
+    bool operator<(const Walker& other) const { return node != other.node ? node < other.node : row < other.row; }
+  };
+  std::vector<Walker> walkers(descriptors.rows), next;
+  for (int r = 0; r < descriptors.rows; ++r) walkers[r] = {0, r};
+  const int padded = PaddedCount(params_.branching);
+  std::vector<float> excess(static_cast<std::size_t>(kComparedRows) * padded);
+  while (!walkers.empty()) {
+    next.clear();
+    for (std::size_t start = 0, end = 0; start < walkers.size(); start = end) {
+      const Node& node = nodes_[walkers[start].node];
+      const float* rows[kComparedRows];
+      while (end < walkers.size() && end - start < kComparedRows && walkers[end].node == walkers[start].node) {
+        rows[end - start] = descriptors.ptr<float>(walkers[end].row);
+        ++end;
+      }
+      if (node.children == 0) {
+        for (std::size_t i = start; i < end; ++i) leaves[walkers[i].row] = node.leaf;
+        continue;
+      }
+      // Always as many rows: one alone would be rounded differently, and its leaf depend on who comes with it.
+      for (std::size_t i = end - start; i < kComparedRows; ++i) rows[i] = rows[0];
+      CompareWithCentroids(Centroids(node.block), node.children, length_, rows, kComparedRows, excess.data());
+      for (std::size_t i = start; i < end; ++i) {
+        const float* first = excess.data() + (i - start) * PaddedCount(node.children);
+        const auto nearest = std::min_element(first, first + node.children) - first;
+        next.push_back({node.first_child + static_cast<int>(nearest), walkers[i].row});
+      }
+    }
+    std::sort(next.begin(), next.end());
+    walkers.swap(next);
+  }
+}
+
 Words VocabularyTree::Quantise(const cv::Mat& descriptors, int paths) const {
   CheckRows(descriptors, length_);
   if (paths < 1) throw std::invalid_argument("vocabulary: paths must be >= 1, is " + std::to_string(paths));
   Words words;
   words.paths = paths;
   words.leaves.assign(static_cast<std::size_t>(descriptors.rows) * paths, -1);
+  if (paths == 1) {
+    FollowNearest(descriptors, words.leaves.data());
+    return words;
+  }
   std::vector<float> excess(PaddedCount(params_.branching));
   std::vector<Reached> reached, next;
   for (int r = 0; r < descriptors.rows; ++r) {
@@ -216,19 +257,26 @@ Words VocabularyTree::Quantise(const cv::Mat& descriptors, int paths) const {
   return words;
 }
 
-std::vector<int> VocabularyTree::Split(int leaf, const cv::Mat& descriptors) {
+int VocabularyTree::Split(int leaf, const cv::Mat& descriptors) {
   CheckRows(descriptors, length_);
   const int node = leaf_nodes_.at(leaf);
-  if (nodes_[node].depth >= kMaxDepth) return {};
+  if (nodes_[node].depth >= kMaxDepth) return -1;
   const std::vector<const float*> rows = RowPointers(descriptors);
   const std::vector<float> centroids = Divide(node, rows.data(), rows.size());
   const int children = static_cast<int>(centroids.size() / length_);
-  if (children < 2) return {};
+  if (children < 2) return -1;
   AddChildren(node, centroids.data(), children);
-  std::vector<int> parts(rows.size());
-  AssignToCentroids(Centroids(nodes_[node].block), children, length_, rows.data(), rows.size(), parts.data());
-  for (int& part : parts) part = nodes_[nodes_[node].first_child + part].leaf;
-  return parts;
+  return node;
+}
+
+std::vector<int> VocabularyTree::LeavesUnder(int node, const cv::Mat& descriptors) const {
+  CheckRows(descriptors, length_);
+  const Node& parent = nodes_.at(node);
+  const std::vector<const float*> rows = RowPointers(descriptors);
+  std::vector<int> leaves(rows.size());
+  AssignToCentroids(Centroids(parent.block), parent.children, length_, rows.data(), rows.size(), leaves.data());
+  for (int& leaf : leaves) leaf = nodes_[parent.first_child + leaf].leaf;
+  return leaves;
 }
 
 }  // namespace vantage::recognition

@@ -53,9 +53,11 @@ class VocabularyTree {
   // Cost: paths x branching x depth distances a row.
   Words Quantise(const cv::Mat& descriptors, int paths = 1) const;
 
-  // Makes a node of a leaf, with children by k-means over `descriptors` (CV_32F rows that fell into it), and tells the new leaf of
-  // every row. Empty, and nothing changed, where they cannot be told apart. Other leaves stay as they are.
-  std::vector<int> Split(int leaf, const cv::Mat& descriptors);
+  // Makes a node of a leaf, with children by k-means over `descriptors` (CV_32F rows that fell into it). Returns the node; -1, and
+  // nothing changed, where they cannot be told apart. Other leaves stay as they are.
+  int Split(int leaf, const cv::Mat& descriptors);
+  // The leaf of every row among the children of a node that Split made: what Quantise says of rows that reach it.
+  std::vector<int> LeavesUnder(int node, const cv::Mat& descriptors) const;
 
   // Writes another file, then renames it: FILE is whole or as it was. Throws std::runtime_error naming the file.
   void Save(const std::filesystem::path& file) const;
@@ -77,6 +79,7 @@ class VocabularyTree {
   VocabularyTree() = default;
   const float* Centroids(int block) const;
   float* Centroids(int block);
+  void FollowNearest(const cv::Mat& descriptors, int* leaves) const;
   int AddBlocks(int count);  // For so many centroids, in one piece.
   void AddChildren(int node, const float* centroids, int count);
   std::vector<float> Divide(int node, const float* const* rows, std::size_t row_count) const;  // Centroids of its parts.

@@ -34,6 +34,7 @@ void AddExplore(CLI::App& app, Run& run);
 void AddModels(CLI::App& app, Run& run);
 void AddEvaluate(CLI::App& app, Run& run);
 // The parts of `evaluate`.
+void AddEvaluateFeatures(CLI::App& evaluate, Run& run);
 void AddEvaluateLearner(CLI::App& evaluate, Run& run);
 void AddEvaluateRecogniser(CLI::App& evaluate, Run& run);
 void AddEvaluateSegmentation(CLI::App& evaluate, Run& run);

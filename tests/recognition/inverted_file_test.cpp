@@ -121,6 +121,30 @@ TEST(InvertedFile, StartsEmptyGrowsAndFindsItsPointsAgain) {
   EXPECT_GT(found, 3000);
 }
 
+// One place that all views crowd: its leaf is split before it is large, though many others wait, so that no view waits for long.
+TEST(InvertedFile, NoLeafGrowsLargeWhileOthersWait) {
+  InvertedFileParams params;
+  params.max_leaf_points = 20;
+  params.refine_distances = 0;  // One split a view.
+  InvertedFile file(VocabularyTree::Train("sift", RandomUnitRows(3000, 1),
+                                          [] {
+                                            VocabularyParams tree;
+                                            tree.branching = 8;
+                                            tree.depth = 3;
+                                            return tree;
+                                          }()),
+                    params);
+  const cv::Mat crowded = RandomUnitRows(1, 2);
+  for (int o = 0; o < 150; ++o) {
+    cv::Mat rows = RandomUnitRows(200, 300 + o);
+    for (int r = 0; o >= 80 && r < 40; ++r) SeenAgain(crowded, 0.3, 1000 * o + r).copyTo(rows.row(r));
+    file.SetView(o, 0, rows);
+    EXPECT_LT(file.LargestLeaf(), 250) << "after view " << o;
+  }
+  EXPECT_TRUE(file.Refine(0)) << "others wait";
+  EXPECT_EQ(file.points(), 30000u);
+}
+
 TEST(InvertedFile, ReplacedAndRemovedViewsAreGone) {
   InvertedFile file = EmptyFile(30);
   const cv::Mat a = RandomUnitRows(90, 1), b = RandomUnitRows(90, 2), c = RandomUnitRows(90, 3);

@@ -87,6 +87,32 @@ TEST(Recogniser, OneObjectFromOneViewWithAndWithoutDepth) {
   }
 }
 
+// SURF does all that SIFT does; what one learned is of no use to the other, and it is said so.
+TEST(Recogniser, WorksOnSurfAndRefusesObjectsOfOtherFeatures) {
+  RecogniserParams surf;
+  surf.features.type = "surf";
+  Recogniser recogniser(surf);
+  recogniser.Set(Learned("plate", Texture(1), surf));
+  const cv::Point corner(320, 230);
+  for (const bool by_tree : {false, true}) {
+    if (by_tree) surf.matching.exhaustive_points = 0;
+    Recogniser another(surf);
+    another.Set(Learned("plate", Texture(1), surf));
+    const auto detections = Recognise(another, FrameWith({{Texture(1), corner}}));
+    ASSERT_EQ(detections.size(), 1u) << by_tree;
+    EXPECT_LT((detections[0].T_camera_object.translation() - PlaceOf(corner)).norm(), 0.003);
+  }
+  try {
+    recogniser.Set(Learned("other", Texture(2), RecogniserParams{}));
+    FAIL() << "an object of SIFT was taken";
+  } catch (const std::invalid_argument& error) {
+    for (const char* part : {"other", "sift", "surf", "learn it again"}) {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << "no " << part << " in: " << error.what();
+    }
+  }
+  EXPECT_NE(surf.Fingerprint(), RecogniserParams{}.Fingerprint()) << "a fitted measure holds for one of them";
+}
+
 TEST(Recogniser, FindsSeveralObjectsAndSeveralInstancesOfOne) {
   Recogniser recogniser{RecogniserParams{}};
   recogniser.Set(Learned("a", Texture(1), recogniser.params()));

@@ -95,8 +95,9 @@ class Cli : public ::testing::Test {
 };
 
 TEST_F(Cli, HelpAndVersionOfEveryVerb) {
-  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "evaluate learner", "evaluate recogniser",
-                           "evaluate segmentation", "models list", "models show", "vocabulary train", "vocabulary show"}) {
+  for (const char* verb :
+       {"", "learn", "recognise", "assess", "explore", "evaluate features", "evaluate learner", "evaluate recogniser",
+        "evaluate segmentation", "models list", "models show", "vocabulary train", "vocabulary show"}) {
     SCOPED_TRACE(verb);
     const Outcome help = Run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
@@ -128,6 +129,9 @@ TEST_F(Cli, MisuseIsOneLine) {
   ExpectRefused("explore --sequence a", "vantage explore", {"--object-id"});
   ExpectRefused("explore --world w.yaml --strategy best", "vantage explore", {"best"});
   ExpectRefused("evaluate", "vantage evaluate", {});
+  ExpectRefused("evaluate features --sequence gone --object-id 3", "vantage evaluate features", {"gone"});
+  ExpectRefused("evaluate features --sequence gone --object-id 3 --features sift:3000", "vantage evaluate features",
+                {"TYPE:MAX_KEYPOINTS:CONTRAST", "sift:3000"});
   ExpectRefused("evaluate learner", "vantage evaluate learner", {"--mesh", "--world"});
   ExpectRefused("evaluate learner --mesh gone", "vantage evaluate learner", {"gone", "textured.obj"});
   ExpectRefused("evaluate learner --mesh a --passes 2", "vantage evaluate learner", {"--passes", "--sequence"});
