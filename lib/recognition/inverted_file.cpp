@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <tuple>
@@ -55,7 +56,7 @@ InvertedFile::InvertedFile(VocabularyTree tree, const InvertedFileParams& params
 }
 
 std::size_t InvertedFile::memory_bytes() const {
-  std::size_t bytes = leaves_.size() * sizeof(Leaf) + slots_.size() * sizeof(Slot);
+  std::size_t bytes = leaves_.size() * sizeof(Leaf) + slots_.size() * (sizeof(Slot) + sizeof(Owner));
   for (const Leaf& leaf : leaves_) {
     bytes += leaf.points.capacity() * sizeof(Point) + leaf.codes.capacity() + leaf.holders.capacity() * sizeof(Holder);
   }
@@ -135,7 +136,7 @@ void InvertedFile::Insert(int index, int slot, const int* keypoints, int count, 
     Encode(descriptors.ptr<float>(keypoints[i]), descriptors.cols, leaf.codes.data() + leaf.codes.size() - descriptors.cols);
   }
   if (!leaf.stopped) slots_[slot].Add(1.0, count, leaf.log_objects);
-  CountHolder(leaf, slots_[slot].object, count);
+  CountHolder(leaf, owners_[slot].object, count);
   UpdateWeight(leaf);
   if (params_.max_leaf_points == 0) return;
   const int split_at = std::max(leaf.split_at, params_.max_leaf_points), urgent_at = kUrgent * split_at;
@@ -161,13 +162,13 @@ void InvertedFile::SetView(int object, int view, const cv::Mat& descriptors) {
   int index = static_cast<int>(slots_.size());
   if (free_slots_.empty()) {
     slots_.emplace_back();
+    owners_.emplace_back();
   } else {
     index = free_slots_.back();
     free_slots_.pop_back();
   }
   Slot& slot = slots_[index];
-  slot.object = object;
-  slot.view = view;
+  owners_[index] = {object, view};
   slot.leaves = words.leaves;
   views_of_[object][view] = index;
   ++view_count_;
@@ -197,12 +198,13 @@ void InvertedFile::RemoveSlot(int index) {
     const auto begin = first - leaf.points.begin(), end = last - leaf.points.begin();
     leaf.codes.erase(leaf.codes.begin() + begin * length, leaf.codes.begin() + end * length);
     leaf.points.erase(first, last);
-    CountHolder(leaf, slot.object, -static_cast<int>(end - begin));
+    CountHolder(leaf, owners_[index].object, -static_cast<int>(end - begin));
     UpdateWeight(leaf);
   }
   --view_count_;
   point_count_ -= slot.leaves.size();
   slot = Slot();
+  owners_[index] = Owner();
   free_slots_.push_back(index);
 }
 
@@ -275,7 +277,7 @@ void InvertedFile::SplitLeaf(int number) {
     const Point& point = old.points[p];
     leaf.points.push_back(point);
     leaf.codes.insert(leaf.codes.end(), old.codes.begin() + p * length, old.codes.begin() + (p + 1) * length);
-    CountHolder(leaf, slots_[point.slot].object, 1);
+    CountHolder(leaf, owners_[point.slot].object, 1);
     slots_[point.slot].leaves[point.keypoint] = parts[p];
   }
   std::vector<int> made(parts);
@@ -338,14 +340,15 @@ std::vector<Ranked> InvertedFile::Rank(const Words& words, int count, int paths)
   }
   std::vector<int> best(views_of_.rbegin()->first + 1, -1);  // The most similar view's slot by object.
   for (const int slot : touched) {
-    int& most = best[slots_[slot].object];
-    if (most < 0 || std::make_pair(common[most], slots_[slot].view) < std::make_pair(common[slot], slots_[most].view)) most = slot;
+    int& most = best[owners_[slot].object];
+    if (most < 0 || std::make_pair(common[most], owners_[slot].view) < std::make_pair(common[slot], owners_[most].view))
+      most = slot;
   }
   std::vector<Ranked> ranking;
   for (const int slot : best) {
     if (slot < 0) continue;
     const double left = std::max(0.0, 2.0 - 2.0 * common[slot]);
-    ranking.push_back({slots_[slot].object, slots_[slot].view, params_.norm == Norm::kL1 ? left : std::sqrt(left)});
+    ranking.push_back({owners_[slot].object, owners_[slot].view, params_.norm == Norm::kL1 ? left : std::sqrt(left)});
   }
   const auto first = ranking.begin() + std::min<std::ptrdiff_t>(std::max(0, count), ranking.end() - ranking.begin());
   std::partial_sort(ranking.begin(), first, ranking.end(),
@@ -357,38 +360,46 @@ std::vector<Ranked> InvertedFile::Rank(const Words& words, int count, int paths)
 std::vector<std::vector<Neighbour>> InvertedFile::Nearest(const cv::Mat& query, const Words& words, int count,
                                                           const std::vector<char>& allowed) const {
   if (words.rows() != query.rows) throw std::invalid_argument("inverted file: words of other rows");
+  std::vector<std::vector<Neighbour>> nearest(query.rows);
+  if (count < 1) return nearest;
   struct Candidate {
     std::int32_t product;
     Point point;
   };
+  const auto is_allowed = [&](const Point& point) {
+    const int object = owners_[point.slot].object;
+    return object < static_cast<int>(allowed.size()) && allowed[object];
+  };
   const int length = tree_.length();
-  std::vector<std::vector<Neighbour>> nearest(query.rows);
   std::vector<std::int16_t> code(length);
   std::vector<std::int32_t> products;
   std::vector<Candidate> best;
   for (int row = 0; row < query.rows; ++row) {
     Encode(query.ptr<float>(row), length, code.data());
     best.clear();
+    std::int32_t least = std::numeric_limits<std::int32_t>::min();  // Only what is nearer goes in.
+    for (int w = 0; w < words.paths && words.of(row)[w] >= 0; ++w) __builtin_prefetch(&leaves_[words.of(row)[w]]);
     for (int w = 0; w < words.paths && words.of(row)[w] >= 0; ++w) {
       const Leaf& leaf = leaves_[words.of(row)[w]];
+      if (w + 1 < words.paths && words.of(row)[w + 1] >= 0) __builtin_prefetch(leaves_[words.of(row)[w + 1]].codes.data());
       const int points = static_cast<int>(leaf.points.size());
       products.resize(std::max<std::size_t>(products.size(), points));
       CodeProducts(code.data(), leaf.codes.data(), points, length, products.data());
       for (int p = 0; p < points; ++p) {
-        const bool full = static_cast<int>(best.size()) == count;
-        if (full && (count == 0 || products[p] <= best.back().product)) continue;
-        const int object = slots_[leaf.points[p].slot].object;
-        if (!allowed.empty() && (object >= static_cast<int>(allowed.size()) || !allowed[object])) continue;
-        if (!full) best.emplace_back();
+        if (products[p] <= least) continue;
+        if (!allowed.empty() && !is_allowed(leaf.points[p])) continue;
+        if (static_cast<int>(best.size()) < count) best.emplace_back();
         std::size_t at = best.size() - 1;
         for (; at > 0 && products[p] > best[at - 1].product; --at) best[at] = best[at - 1];
         best[at] = {products[p], leaf.points[p]};
+        if (static_cast<int>(best.size()) == count) least = best.back().product;
       }
     }
+    nearest[row].reserve(best.size());
     for (const Candidate& candidate : best) {
-      const Slot& slot = slots_[candidate.point.slot];
+      const Owner& owner = owners_[candidate.point.slot];
       const float cosine = candidate.product / (kCodeScale * kCodeScale);
-      nearest[row].push_back({slot.object, slot.view, candidate.point.keypoint, std::sqrt(std::max(0.f, 2.f - 2.f * cosine))});
+      nearest[row].push_back({owner.object, owner.view, candidate.point.keypoint, std::sqrt(std::max(0.f, 2.f - 2.f * cosine))});
     }
   }
   return nearest;

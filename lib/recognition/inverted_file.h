@@ -88,10 +88,13 @@ class InvertedFile {
     bool stopped = false;
     int split_at = 0;  // More points than this ask for a split.
   };
-  // Sums over a view's leaves with term frequency m and l = ln N_i, from which its norm follows for any N: w = ln(N + B) - l.
-  struct Slot {
+  // Whose a slot is.
+  struct Owner {
     std::int32_t object = -1;
     std::int32_t view = -1;
+  };
+  // Sums over a view's leaves with term frequency m and l = ln N_i, from which its norm follows for any N: w = ln(N + B) - l.
+  struct Slot {
     std::vector<std::int32_t> leaves;  // Of every keypoint.
     double m = 0.0, ml = 0.0, m2 = 0.0, m2l = 0.0, m2l2 = 0.0;
 
@@ -117,6 +120,7 @@ class InvertedFile {
   VocabularyTree tree_;
   std::deque<Leaf> leaves_;
   std::deque<Slot> slots_;
+  std::vector<Owner> owners_;  // By slot; apart, since every tentative match asks.
   std::vector<int> free_slots_;
   std::map<int, std::map<int, int>> views_of_;  // Object -> view -> slot.
   std::deque<int> overfull_;

@@ -245,7 +245,10 @@ Words VocabularyTree::Quantise(const cv::Mat& descriptors, int paths) const {
           continue;
         }
         CompareWithCentroids(Centroids(node.block), node.children, length_, &row, 1, excess.data());
-        for (int c = 0; c < node.children; ++c) Offer(next, paths, {excess[c], node.first_child + c});
+        for (int c = 0; c < node.children; ++c) {
+          if (static_cast<int>(next.size()) == paths && excess[c] > next.back().excess) continue;
+          Offer(next, paths, {excess[c], node.first_child + c});
+        }
       }
       for (const Reached& to : next) deeper = deeper || nodes_[to.node].children > 0;
       reached.swap(next);
