@@ -46,4 +46,17 @@ __attribute__((target_clones("arch=x86-64-v3", "default"))) void InnerProductsOf
   *reinterpret_cast<Lanes*>(products + kLanes) = (high[0] + high[1]) + (high[2] + high[3]);
 }
 
+__attribute__((target_clones("arch=x86-64-v3", "default"))) float SquaredDistance(const float* a, const float* b, int length) {
+  constexpr int kParts = 8;
+  float parts[kParts] = {};
+  int i = 0;
+  for (; i + kParts <= length; i += kParts) {
+    for (int p = 0; p < kParts; ++p) parts[p] += (a[i + p] - b[i + p]) * (a[i + p] - b[i + p]);
+  }
+  float sum = 0.f;
+  for (; i < length; ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+  for (const float part : parts) sum += part;
+  return sum;
+}
+
 }  // namespace vantage::features

@@ -1,4 +1,4 @@
-// Inner products of many rows at once: where matching and the vocabulary tree spend their time.
+// Inner products and distances of rows: where matching and the vocabulary tree spend their time.
 #pragma once
 
 namespace vantage::features {
@@ -13,5 +13,8 @@ void InnerProducts(const float* columns, const float* const* rows, int length, f
 
 // The same for one row; rounded differently. Cost: about length / 5 ns.
 void InnerProductsOfOne(const float* columns, const float* row, int length, float* products);
+
+// |a - b|^2. Cost: about length / 6 ns.
+float SquaredDistance(const float* a, const float* b, int length);
 
 }  // namespace vantage::features

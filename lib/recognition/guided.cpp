@@ -4,14 +4,11 @@
 #include <map>
 #include <numeric>
 
+#include "features/inner_products.h"
 #include "pose/refine.h"
 
 namespace vantage::recognition {
 namespace {
-
-double DescriptorDistance(const cv::Mat& a, int row_a, const cv::Mat& b, int row_b) {
-  return cv::norm(a.row(row_a), b.row(row_b), cv::NORM_L2);
-}
 
 // The best model partner of each keypoint that has one near enough.
 std::map<int, std::pair<double, GuidedMatch>> Partners(const model::ObjectModel& object, const geometry::Rigid& T_camera_object,
@@ -20,6 +17,7 @@ std::map<int, std::pair<double, GuidedMatch>> Partners(const model::ObjectModel&
                                                        const GuidedParams& params) {
   std::map<int, std::pair<double, GuidedMatch>> partners;
   const double min_cosine = std::cos(80.0 * M_PI / 180.0);
+  const int length = features.descriptors.cols;
   for (const int view_index : model::NearestViews(object, T_camera_object, params.views)) {
     const model::View& view = object.views[view_index];
     for (size_t k = 0; k < view.points.size(); ++k) {
@@ -28,8 +26,9 @@ std::map<int, std::pair<double, GuidedMatch>> Partners(const model::ObjectModel&
       if (-(T_camera_object.linear() * point.normal).dot(in_camera.normalized()) < min_cosine) continue;
       const auto pixel = camera.Project(in_camera);
       if (!pixel || !camera.Contains(*pixel)) continue;
+      const float* row = view.features.descriptors.ptr<float>(static_cast<int>(k));
       for (const int keypoint : grid.Near(*pixel, radius_px)) {
-        const double distance = DescriptorDistance(features.descriptors, keypoint, view.features.descriptors, static_cast<int>(k));
+        const double distance = std::sqrt(features::SquaredDistance(features.descriptors.ptr<float>(keypoint), row, length));
         if (distance > params.max_distance) continue;
         const auto found = partners.find(keypoint);
         if (found != partners.end() && found->second.first <= distance) continue;

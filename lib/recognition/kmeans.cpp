@@ -17,19 +17,6 @@ constexpr float kNever = std::numeric_limits<float>::max() / 4;
 
 std::size_t BlockFloats(int length) { return static_cast<std::size_t>(kBlock) * (length + 1); }
 
-__attribute__((target_clones("arch=x86-64-v3", "default"))) float SquaredDistance(const float* a, const float* b, int length) {
-  constexpr int kParts = 8;
-  float parts[kParts] = {};
-  int i = 0;
-  for (; i + kParts <= length; i += kParts) {
-    for (int p = 0; p < kParts; ++p) parts[p] += (a[i + p] - b[i + p]) * (a[i + p] - b[i + p]);
-  }
-  float sum = 0.f;
-  for (; i < length; ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  for (const float part : parts) sum += part;
-  return sum;
-}
-
 double Uniform(std::mt19937& random) { return random() / 4294967296.0; }
 
 // Rows drawn evenly, in their order.
@@ -54,7 +41,7 @@ std::vector<float> FirstCentroids(const std::vector<const float*>& rows, int len
     centroids.insert(centroids.end(), rows[next], rows[next] + length);
     double sum = 0.0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      distance[i] = std::min<double>(distance[i], SquaredDistance(rows[i], rows[next], length));
+      distance[i] = std::min<double>(distance[i], features::SquaredDistance(rows[i], rows[next], length));
       sum += distance[i];
     }
     if (sum <= 0.0) break;  // Every row is a centroid.

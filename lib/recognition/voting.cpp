@@ -14,14 +14,17 @@ Vote CastVote(const cv::KeyPoint& query, const cv::KeyPoint& model, const Eigen:
 
 std::vector<VoteCluster> MeanShift(const std::vector<Vote>& votes, double bandwidth) {
   constexpr int kMaxSteps = 20;
+  std::vector<double> reach_px2;  // Squared.
+  for (const Vote& vote : votes) reach_px2.push_back(bandwidth * vote.radius_px * bandwidth * vote.radius_px);
   std::vector<Eigen::Vector2d> modes;
   for (const Vote& start : votes) {
     Eigen::Vector2d mode = start.centre;
     for (int step = 0; step < kMaxSteps; ++step) {
       Eigen::Vector2d sum = Eigen::Vector2d::Zero();
       double weight = 0.0;
-      for (const Vote& vote : votes) {
-        if ((vote.centre - mode).norm() > bandwidth * vote.radius_px) continue;
+      for (size_t i = 0; i < votes.size(); ++i) {
+        const Vote& vote = votes[i];
+        if ((vote.centre - mode).squaredNorm() > reach_px2[i]) continue;
         sum += vote.weight * vote.centre;
         weight += vote.weight;
       }
