@@ -183,40 +183,50 @@ void Offer(std::vector<Reached>& best, std::size_t most, const Reached& candidat
 
 }  // namespace
 
+// Always compares as many rows at once: one alone would be rounded differently, and its leaf depend on who comes with it.
+void VocabularyTree::NearestChildren(int node, const cv::Mat& descriptors, const int* rows, std::size_t count, int* nearest) const {
+  const int children = nodes_[node].children, padded = PaddedCount(children);
+  std::vector<float> excess(static_cast<std::size_t>(kComparedRows) * padded);
+  for (std::size_t i = 0; i < count; i += kComparedRows) {
+    const float* compared[kComparedRows];
+    const std::size_t now = std::min<std::size_t>(kComparedRows, count - i);
+    for (std::size_t r = 0; r < kComparedRows; ++r) compared[r] = descriptors.ptr<float>(rows[i + (r < now ? r : 0)]);
+    CompareWithCentroids(Centroids(nodes_[node].block), children, length_, compared, kComparedRows, excess.data());
+    for (std::size_t r = 0; r < now; ++r) {
+      const float* first = excess.data() + r * padded;
+      nearest[i + r] = static_cast<int>(std::min_element(first, first + children) - first);
+    }
+  }
+}
+
 // One path: level by level, rows at one node together, so that its centroids are fetched once for all of them.
 void VocabularyTree::FollowNearest(const cv::Mat& descriptors, int* leaves) const {
-  struct Walker {
-    int node, row;
-    bool operator<(const Walker& other) const { return node != other.node ? node < other.node : row < other.row; }
+  struct Group {
+    int node;
+    std::size_t begin, end;  // Of rows.
   };
-  std::vector<Walker> walkers(descriptors.rows), next;
-  for (int r = 0; r < descriptors.rows; ++r) walkers[r] = {0, r};
-  const int padded = PaddedCount(params_.branching);
-  std::vector<float> excess(static_cast<std::size_t>(kComparedRows) * padded);
-  while (!walkers.empty()) {
+  const std::size_t count = descriptors.rows;
+  std::vector<int> rows(count), sorted(count), nearest(count);
+  std::iota(rows.begin(), rows.end(), 0);
+  std::vector<std::size_t> begin;
+  std::vector<Group> groups = {{0, 0, count}}, next;
+  for (; !groups.empty(); groups.swap(next), rows.swap(sorted)) {
     next.clear();
-    for (std::size_t start = 0, end = 0; start < walkers.size(); start = end) {
-      const Node& node = nodes_[walkers[start].node];
-      const float* rows[kComparedRows];
-      while (end < walkers.size() && end - start < kComparedRows && walkers[end].node == walkers[start].node) {
-        rows[end - start] = descriptors.ptr<float>(walkers[end].row);
-        ++end;
-      }
+    for (const Group& group : groups) {
+      const Node& node = nodes_[group.node];
       if (node.children == 0) {
-        for (std::size_t i = start; i < end; ++i) leaves[walkers[i].row] = node.leaf;
+        for (std::size_t i = group.begin; i < group.end; ++i) leaves[rows[i]] = node.leaf;
         continue;
       }
-      // Always as many rows: one alone would be rounded differently, and its leaf depend on who comes with it.
-      for (std::size_t i = end - start; i < kComparedRows; ++i) rows[i] = rows[0];
-      CompareWithCentroids(Centroids(node.block), node.children, length_, rows, kComparedRows, excess.data());
-      for (std::size_t i = start; i < end; ++i) {
-        const float* first = excess.data() + (i - start) * PaddedCount(node.children);
-        const auto nearest = std::min_element(first, first + node.children) - first;
-        next.push_back({node.first_child + static_cast<int>(nearest), walkers[i].row});
+      NearestChildren(group.node, descriptors, rows.data() + group.begin, group.end - group.begin, nearest.data() + group.begin);
+      begin.assign(node.children + 1, group.begin);
+      for (std::size_t i = group.begin; i < group.end; ++i) ++begin[nearest[i] + 1];
+      for (int c = 0; c < node.children; ++c) {
+        begin[c + 1] += begin[c] - group.begin;
+        if (begin[c + 1] > begin[c]) next.push_back({node.first_child + c, begin[c], begin[c + 1]});
       }
+      for (std::size_t i = group.begin; i < group.end; ++i) sorted[begin[nearest[i]]++] = rows[i];
     }
-    std::sort(next.begin(), next.end());
-    walkers.swap(next);
   }
 }
 

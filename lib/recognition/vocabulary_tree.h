@@ -79,6 +79,7 @@ class VocabularyTree {
   VocabularyTree() = default;
   const float* Centroids(int block) const;
   float* Centroids(int block);
+  void NearestChildren(int node, const cv::Mat& descriptors, const int* rows, std::size_t count, int* nearest) const;
   void FollowNearest(const cv::Mat& descriptors, int* leaves) const;
   int AddBlocks(int count);  // For so many centroids, in one piece.
   void AddChildren(int node, const float* centroids, int count);
