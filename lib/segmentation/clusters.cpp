@@ -1,4 +1,6 @@
 #include "segmentation/clusters.h"
+#include "segmentation/creases.h"
+#include "segmentation/joining.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -13,197 +15,95 @@
 namespace vantage::segmentation {
 namespace {
 
+constexpr double kFloorShare = 0.3, kFloorHeight_m = 0.002;
 constexpr double kClickRadius_px = 20.0;
-constexpr int kPiecesPerObject = 8;     // A piece this much smaller than an object may still be joined to one.
-constexpr double kJumpFloor_m2 = 0.25;  // Nearer than half a metre depth noise no longer falls with its square.
+constexpr int kPiecesPerObject = 8;  // A piece this much smaller than an object may still be joined to one.
 
 void Require(bool ok, const char* what, double found) {
   if (!ok) throw std::invalid_argument(std::string("clusters: ") + what + ", is " + std::to_string(found));
 }
 
-enum PixelState : std::uint8_t { kUnknown = 0, kOther = 1, kAbove = 2 };  // No depth; table and far things; object.
-
-// Pixel states by height above the plane.
-cv::Mat Classify(const cv::Mat& cloud, const Plane& plane, const ClusterParams& params) {
-  cv::Mat states(cloud.size(), CV_8UC1, cv::Scalar(kUnknown));
-  const cv::Vec3f normal(static_cast<float>(plane.normal.x()), static_cast<float>(plane.normal.y()),
-                         static_cast<float>(plane.normal.z()));
-  const float offset = static_cast<float>(plane.offset_m);
-  for (int y = 0; y < cloud.rows; ++y) {
-    const cv::Vec3f* points = cloud.ptr<cv::Vec3f>(y);
-    std::uint8_t* row = states.ptr<std::uint8_t>(y);
-    for (int x = 0; x < cloud.cols; ++x) {
-      if (std::isnan(points[x][2])) continue;
-      const float height = normal.dot(points[x]) + offset;
-      row[x] = height >= params.min_height_m && height <= params.max_height_m ? kAbove : kOther;
+// The surfaces that may be (pieces of) objects, joined to objects.
+std::vector<Part> FindParts(const rgbd::Frame& frame, const cv::Mat& states, const cv::Mat& cloud, const Plane& plane,
+                            const ClusterParams& params) {
+  const cv::Rect box = cv::boundingRect(states == kAbove);  // Mostly far less than the frame.
+  if (box.empty()) return {};
+  const Surfaces surfaces =
+      PartAtCreases(states(box).clone(), cloud(box).clone(), frame.camera.Cropped(box.x, box.y, box.width, box.height), params);
+  std::vector<std::vector<cv::Point>> members(surfaces.count + 1);
+  for (int y = 0; y < box.height; ++y)
+    for (int x = 0; x < box.width; ++x)
+      if (const int label = surfaces.labels.at<int>(y, x)) members[label].emplace_back(box.x + x, box.y + y);
+  std::vector<Part> parts;
+  for (int label = 1; label <= surfaces.count; ++label) {
+    if (static_cast<int>(members[label].size()) * kPiecesPerObject < params.min_pixels) continue;
+    std::vector<Eigen::Vector3d> points;
+    for (const cv::Point& pixel : members[label]) {
+      const cv::Vec3f& p = cloud.at<cv::Vec3f>(pixel);
+      points.emplace_back(p[0], p[1], p[2]);
     }
+    if (LongestSide(points) > params.max_size_m) continue;
+    parts.push_back(MakePart(std::move(members[label]), std::move(points), plane));
+    parts.back().surfaces = {label};
   }
-  return states;
+  JoinParts(frame, states, cloud, surfaces.in_crease, params, &parts);
+  return parts;
 }
 
-// Disjoint sets over pixel indices (union by index, path halving).
-class DisjointSets {
- public:
-  explicit DisjointSets(int size) : parents_(size) { std::iota(parents_.begin(), parents_.end(), 0); }
-  int Find(int a) {
-    while (parents_[a] != a) a = parents_[a] = parents_[parents_[a]];
-    return a;
-  }
-  void Unite(int a, int b) {
-    a = Find(a), b = Find(b);
-    if (a != b) parents_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> parents_;
-};
-
-// Joins every object pixel with the next one to the right, below and along both diagonals: across holes up to bridge_px wide, not
-// across a depth jump (a slanted surface may fall half as much again for every pixel of a hole), and not across anything measured
-// that is no object.
-DisjointSets Connect(const cv::Mat& states, const cv::Mat& cloud, const ClusterParams& params) {
-  DisjointSets sets(states.rows * states.cols);
-  const cv::Point directions[] = {{1, 0}, {0, 1}, {1, 1}, {-1, 1}};
-  for (int y = 0; y < states.rows; ++y) {
-    for (int x = 0; x < states.cols; ++x) {
-      if (states.at<std::uint8_t>(y, x) != kAbove) continue;
-      const float z = cloud.at<cv::Vec3f>(y, x)[2];
-      const float jump_m = static_cast<float>(params.max_jump_m * std::max(kJumpFloor_m2, static_cast<double>(z) * z));
-      for (const cv::Point& direction : directions) {
+// What lies within the mask's outline and counts as table, but is the floor of a vessel: its surface goes on in the mask's, and it
+// lies higher than the table.
+cv::Mat FloorsWithin(const cv::Mat& filled, const cv::Mat& mask, const cv::Mat& states, const cv::Mat& cloud, const Plane& plane,
+                     const ClusterParams& params) {
+  cv::Mat floors(mask.size(), CV_8UC1, cv::Scalar(0)), labels;
+  const int count = cv::connectedComponents(filled & (states == kOther) & ~mask, labels, 8, CV_32S);
+  struct Hole {
+    int pixels = 0, pairs = 0, continuous = 0;
+    double height_m = 0.0;
+  };
+  std::vector<Hole> holes(count);
+  for (int y = 0; y < labels.rows; ++y) {
+    for (int x = 0; x < labels.cols; ++x) {
+      const int label = labels.at<int>(y, x);
+      if (label == 0) continue;
+      const cv::Vec3f& p = cloud.at<cv::Vec3f>(y, x);
+      Hole& hole = holes[label];
+      ++hole.pixels;
+      hole.height_m += plane.Height({p[0], p[1], p[2]});
+      for (const cv::Point& direction : {cv::Point(1, 0), cv::Point(-1, 0), cv::Point(0, 1), cv::Point(0, -1)}) {
         for (int step = 1; step <= params.bridge_px + 1; ++step) {
-          const int u = x + step * direction.x, v = y + step * direction.y;
-          if (u < 0 || u >= states.cols || v >= states.rows) break;
-          const std::uint8_t state = states.at<std::uint8_t>(v, u);
-          if (state == kUnknown) continue;
-          if (state == kAbove &&
-              std::abs(cloud.at<cv::Vec3f>(v, u)[2] - z) <= jump_m * (1.0f + 0.5f * static_cast<float>(step - 1)))
-            sets.Unite(y * states.cols + x, v * states.cols + u);
+          const cv::Point to(x + step * direction.x, y + step * direction.y);
+          if (to.x < 0 || to.y < 0 || to.x >= labels.cols || to.y >= labels.rows || labels.at<int>(to) == label) break;
+          if (!mask.at<std::uint8_t>(to)) continue;
+          ++hole.pairs;
+          hole.continuous += std::abs(cloud.at<cv::Vec3f>(to)[2] - p[2]) <= JumpAt(p[2], params);
           break;
         }
       }
     }
   }
-  return sets;
-}
-
-// A connected part: several may make up one object.
-struct Part {
-  std::vector<cv::Point> pixels;
-  std::vector<Eigen::Vector3d> points;    // In the order of pixels; camera coordinates, metres.
-  std::vector<cv::Point2f> footprint_cm;  // The points seen from above, in the plane.
-  std::vector<cv::Point2f> hull_cm;       // Convex hull of the footprint.
-  double low_m = 0.0, high_m = 0.0;       // Range of heights above the plane.
-};
-
-Eigen::Vector3d Centroid(const std::vector<Eigen::Vector3d>& points) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& point : points) sum += point;
-  return sum / static_cast<double>(points.size());
-}
-
-// The longest side of the points' box along their principal axes, metres.
-double LongestSide(const std::vector<Eigen::Vector3d>& points) {
-  const Eigen::Vector3d centroid = Centroid(points);
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& point : points) covariance += (point - centroid) * (point - centroid).transpose();
-  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvectors();
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9), high = -low;
-  for (const Eigen::Vector3d& point : points) {
-    const Eigen::Vector3d along = axes.transpose() * (point - centroid);
-    low = low.cwiseMin(along), high = high.cwiseMax(along);
+  for (int label = 1; label < count; ++label) {
+    const Hole& hole = holes[label];
+    if (hole.continuous >= kFloorShare * hole.pairs && hole.height_m >= kFloorHeight_m * hole.pixels)
+      floors.setTo(255, labels == label);
   }
-  return (high - low).maxCoeff();
+  return floors;
 }
 
-Part MakePart(std::vector<cv::Point> pixels, const cv::Mat& cloud, const Plane& plane) {
-  Part part;
-  part.pixels = std::move(pixels);
-  const Eigen::Vector3d u = plane.normal.unitOrthogonal(), v = plane.normal.cross(u);
-  part.low_m = 1e9, part.high_m = -1e9;
-  for (const cv::Point& pixel : part.pixels) {
-    const cv::Vec3f& p = cloud.at<cv::Vec3f>(pixel);
-    const Eigen::Vector3d point(p[0], p[1], p[2]);
-    part.points.push_back(point);
-    part.footprint_cm.emplace_back(static_cast<float>(100.0 * u.dot(point)), static_cast<float>(100.0 * v.dot(point)));
-    part.low_m = std::min(part.low_m, plane.Height(point));
-    part.high_m = std::max(part.high_m, plane.Height(point));
-  }
-  cv::convexHull(part.footprint_cm, part.hull_cm);
-  return part;
-}
-
-// Whether enough of `inner` lies within `outer`, seen from above and seen from the side. What stands on top of something does not.
-bool BelongsTo(const Part& inner, const Part& outer, double share) {
-  const double common_m = std::min(inner.high_m, outer.high_m) - std::max(inner.low_m, outer.low_m);
-  if (common_m < share * (inner.high_m - inner.low_m)) return false;
-  if (outer.hull_cm.size() < 3) return false;
-  const std::size_t stride = 1 + inner.footprint_cm.size() / 500;  // A few hundred points tell the share.
-  int inside = 0, tested = 0;
-  for (std::size_t i = 0; i < inner.footprint_cm.size(); i += stride, ++tested)
-    inside += cv::pointPolygonTest(outer.hull_cm, inner.footprint_cm[i], false) >= 0.0;
-  return inside >= share * tested;
-}
-
-Part Join(const Part& a, const Part& b) {
-  Part both = a;
-  both.pixels.insert(both.pixels.end(), b.pixels.begin(), b.pixels.end());
-  both.points.insert(both.points.end(), b.points.begin(), b.points.end());
-  both.footprint_cm.insert(both.footprint_cm.end(), b.footprint_cm.begin(), b.footprint_cm.end());
-  std::vector<cv::Point2f> corners = a.hull_cm;
-  corners.insert(corners.end(), b.hull_cm.begin(), b.hull_cm.end());
-  cv::convexHull(corners, both.hull_cm);
-  both.low_m = std::min(a.low_m, b.low_m);
-  both.high_m = std::max(a.high_m, b.high_m);
-  return both;
-}
-
-// Joins parts that belong together, largest first, until nothing changes. Never beyond the largest size of an object.
-void MergeParts(std::vector<Part>& parts, const ClusterParams& params) {
-  std::stable_sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.pixels.size() > b.pixels.size(); });
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    for (std::size_t k = i + 1; k < parts.size(); ++k) {
-      if (!BelongsTo(parts[k], parts[i], params.merge_share) && !BelongsTo(parts[i], parts[k], params.merge_share)) continue;
-      Part both = Join(parts[i], parts[k]);
-      if (LongestSide(both.points) > params.max_size_m) continue;
-      parts[i] = std::move(both);
-      parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(k));
-      k = i;  // The larger hull may hold a part that was passed over.
-    }
-  }
-}
-
-// The connected parts that may be (pieces of) objects.
-std::vector<Part> FindParts(const cv::Mat& states, const cv::Mat& cloud, const Plane& plane, const ClusterParams& params) {
-  DisjointSets sets = Connect(states, cloud, params);
-  std::map<int, std::vector<cv::Point>> members;  // By the set's first pixel, so the order is the same on every run.
-  for (int y = 0; y < states.rows; ++y)
-    for (int x = 0; x < states.cols; ++x)
-      if (states.at<std::uint8_t>(y, x) == kAbove) members[sets.Find(y * states.cols + x)].emplace_back(x, y);
-  std::vector<Part> parts;
-  for (auto& [root, pixels] : members) {
-    if (static_cast<int>(pixels.size()) * kPiecesPerObject < params.min_pixels) continue;
-    Part part = MakePart(std::move(pixels), cloud, plane);
-    if (LongestSide(part.points) <= params.max_size_m) parts.push_back(std::move(part));
-  }
-  return parts;
-}
-
-// Closes the mask: gaps up to the bridge's width, and holes inside it where nothing was measured. `blocked` pixels (the table,
-// other clusters) stay out: a hole through which the table is seen is a hole.
-void CloseHoles(cv::Mat& mask, const cv::Mat& blocked, int bridge_px) {
-  const int side = 2 * bridge_px + 1;
+// Closes the mask (of part pixels; region of the frame): gaps up to the bridge's width, and holes inside it where nothing was
+// measured or a vessel's floor was. `blocked` pixels (the table, other clusters) stay out: a hole through which the table is seen
+// is a hole.
+void CloseHoles(cv::Mat& mask, const cv::Mat& others, const cv::Mat& states, const cv::Mat& cloud, const Plane& plane,
+                const ClusterParams& params) {
+  const int side = 2 * params.bridge_px + 1;
   const cv::Mat kernel = cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(side, side));
   cv::Mat closed;
   cv::morphologyEx(mask, closed, cv::MORPH_CLOSE, kernel, cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(0));
   std::vector<std::vector<cv::Point>> outlines;
   cv::findContours(closed, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
   cv::drawContours(closed, outlines, -1, cv::Scalar(255), cv::FILLED);
-  closed.setTo(0, blocked);
+  const cv::Mat floors = FloorsWithin(closed, mask, states, cloud, plane, params);
+  closed.setTo(0, ((states == kOther) & ~floors) | others);
   mask |= closed;
-}
-
-cv::Mat BlockedFor(const cv::Mat& labels, const cv::Mat& states, int label) {
-  return (states == kOther) | ((labels != label) & (labels != 0));
 }
 
 bool TouchesBorder(const cv::Rect& box, const cv::Rect& measured, const cv::Size& image) {
@@ -244,6 +144,10 @@ void ClusterParams::Check() const {
   Require(std::isfinite(max_jump_m) && max_jump_m > 0.0, "max_jump_m must be > 0", max_jump_m);
   Require(bridge_px >= 1, "bridge_px must be >= 1", bridge_px);
   Require(merge_share > 0.0, "merge_share must be > 0", merge_share);
+  Require(std::isfinite(crease_arm_m) && crease_arm_m > 0.0, "crease_arm_m must be > 0", crease_arm_m);
+  Require(min_crease_deg >= 20.0 && min_crease_deg <= 180.0, "min_crease_deg must be in [20, 180]", min_crease_deg);
+  Require(std::isfinite(min_part_m) && min_part_m > 0.0, "min_part_m must be > 0", min_part_m);
+  Require(std::isfinite(min_crease_share) && min_crease_share > 0.0, "min_crease_share must be > 0", min_crease_share);
   Require(std::isfinite(min_size_m) && min_size_m > 0.0, "min_size_m must be > 0", min_size_m);
   Require(max_size_m > min_size_m, "max_size_m must be > min_size_m", max_size_m);
   Require(min_pixels >= 1, "min_pixels must be >= 1", min_pixels);
@@ -254,8 +158,7 @@ std::vector<Cluster> FindClusters(const rgbd::Frame& frame, const Plane& plane, 
   if (frame.depth.empty()) return {};
   const cv::Mat cloud = rgbd::OrganisedCloud(frame);
   const cv::Mat states = Classify(cloud, plane, params);
-  std::vector<Part> parts = FindParts(states, cloud, plane, params);
-  MergeParts(parts, params);
+  const std::vector<Part> parts = FindParts(frame, states, cloud, plane, params);
 
   cv::Mat labels(states.size(), CV_32SC1, cv::Scalar(0));
   std::vector<Cluster> clusters;
@@ -274,8 +177,13 @@ std::vector<Cluster> FindClusters(const rgbd::Frame& frame, const Plane& plane, 
 
   const cv::Rect measured = cv::boundingRect(states != kUnknown);
   for (std::size_t i = 0; i < clusters.size(); ++i) {
-    CloseHoles(clusters[i].mask, BlockedFor(labels, states, static_cast<int>(i) + 1), params.bridge_px);
-    clusters[i].box = cv::boundingRect(clusters[i].mask);
+    const cv::Rect seen = cv::boundingRect(clusters[i].mask);
+    const cv::Point margin(params.bridge_px + 1, params.bridge_px + 1);
+    const cv::Rect around = cv::Rect(seen.tl() - margin, seen.br() + margin) & cv::Rect({}, states.size());
+    const int label = static_cast<int>(i) + 1;
+    cv::Mat mask = clusters[i].mask(around);
+    CloseHoles(mask, (labels(around) != label) & (labels(around) != 0), states(around), cloud(around), plane, params);
+    clusters[i].box = cv::boundingRect(mask) + around.tl();
     clusters[i].touches_border = TouchesBorder(clusters[i].box, measured, states.size());
   }
   std::stable_sort(clusters.begin(), clusters.end(), [](const Cluster& a, const Cluster& b) { return a.pixels > b.pixels; });

@@ -13,12 +13,16 @@ struct ClusterParams {
   double max_height_m = 0.6;   // > min_height_m.
   double max_jump_m =
       0.015;  // Neighbouring pixels further apart in depth belong to different objects, at 1 m; grows with depth squared; > 0.
-  int bridge_px = 3;         // Holes up to this wide do not part an object; >= 1.
-  double merge_share = 0.2;  // A part with this share of its footprint and of its height within another's belongs to it (shadows
-                             // and dark insides part what is one); > 0, above 1 to keep all apart.
-  double min_size_m = 0.02;  // Smaller (longest side) clusters are not objects; > 0.
-  double max_size_m = 0.6;   // > min_size_m.
-  int min_pixels = 300;      // >= 1.
+  int bridge_px = 3;           // Holes up to this wide do not part an object; >= 1.
+  double merge_share = 0.2;    // A part with this share of its footprint and of its height within another's belongs to it (shadows
+                               // and dark insides part what is one); > 0, above 1 to keep all apart.
+  double crease_arm_m = 0.02;  // Where a surface bends inwards, two arms of this length on it say how much; > 0.
+  double min_crease_deg = 60.0;    // Surfaces that meet in a crease bent so far (in the mean) are different objects; [20, 180].
+  double min_part_m = 0.06;        // ...of at least this size (diagonal; a cap or a handle is part of its bottle or mug); > 0.
+  double min_crease_share = 0.25;  // ...and where the crease is at least this long, over the smaller one's size; > 0.
+  double min_size_m = 0.02;        // Smaller (longest side) clusters are not objects; > 0.
+  double max_size_m = 0.6;         // > min_size_m.
+  int min_pixels = 300;            // >= 1.
 
   void Check() const;
 };
@@ -31,7 +35,10 @@ struct Cluster {
   bool touches_border = false;
 };
 
-// Clusters by falling number of pixels. Camera coordinates. Empty where the frame has no depth. About 25 ms for 640x480.
+// Objects are parted at jumps in depth and where their surfaces meet in sharp concave creases (one stands on the other, or they
+// touch); parts of one object are joined: pieces within each other, inside and outside of a vessel, a handle, and what goes on
+// behind a nearer object. A vessel's floor belongs to its mask. Clusters by falling number of pixels. Camera coordinates. Empty
+// where the frame has no depth. About 25 ms for 640x480.
 std::vector<Cluster> FindClusters(const rgbd::Frame& frame, const Plane& plane, const ClusterParams& params);
 
 // The cluster that holds the pixel (or whose mask is nearest, within 20 px); -1 where there is none.

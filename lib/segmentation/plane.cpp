@@ -6,7 +6,9 @@
 #include <pcl/sample_consensus/sac_model_plane.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -19,6 +21,7 @@ using Cloud = pcl::PointCloud<pcl::PointXYZ>;
 
 constexpr int kMaxPlanes = 4;  // Looked at before a table is chosen.
 constexpr int kRefinements = 4;
+constexpr double kFloor_m = 0.4;  // A plane so far under another is the floor, and the other the table.
 
 void Require(bool ok, const char* what, double found) {
   if (!ok) throw std::invalid_argument(std::string("plane: ") + what + ", is " + std::to_string(found));
@@ -71,6 +74,45 @@ Plane Refine(const Cloud& cloud, const pcl::Indices& among, Plane plane, double 
   return plane;
 }
 
+// Over how much the points spread across their longest direction, metres.
+double Breadth(const Cloud& cloud, const pcl::Indices& among) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  for (const int index : among) {
+    const Eigen::Vector3d point = At(cloud, index);
+    mean += point;
+    moments += point * point.transpose();
+  }
+  const double count = static_cast<double>(std::max<std::size_t>(1, among.size()));
+  mean /= count;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(moments / count - mean * mean.transpose());
+  return std::sqrt(12.0 * std::max(0.0, solver.eigenvalues()(1)));
+}
+
+// The table that stands on `floor`: the largest level plane far enough above it; nullopt where there is none.
+std::optional<Plane> TableOver(const Cloud& cloud, const pcl::Indices& among, const Plane& floor, const PlaneParams& params) {
+  std::map<int, int> layers;  // Points by height in bands of max_distance_m.
+  for (const int index : among)
+    if (const double height_m = floor.Height(At(cloud, index)); height_m >= kFloor_m)
+      ++layers[static_cast<int>(height_m / params.max_distance_m)];
+  int thickest = -1, most = 0;  // Two neighbouring bands: the table may lie on their border.
+  for (const auto& [layer, count] : layers) {
+    const auto next = layers.find(layer + 1);
+    const int both = count + (next == layers.end() ? 0 : next->second);
+    if (both > most) most = both, thickest = layer;
+  }
+  if (most < params.min_share * static_cast<double>(cloud.size())) return std::nullopt;
+  Plane table = floor;
+  table.offset_m -= (thickest + 1) * params.max_distance_m;
+  table = Refine(cloud, among, table, params.max_distance_m);
+  pcl::Indices on;
+  for (const int index : among)
+    if (std::abs(table.Height(At(cloud, index))) <= params.max_distance_m) on.push_back(index);
+  table.share = static_cast<double>(on.size()) / static_cast<double>(cloud.size());
+  if (table.share < params.min_share || Breadth(cloud, on) < params.min_size_m) return std::nullopt;
+  return table;
+}
+
 // The plane with most support among the given points; nullopt where RANSAC finds none.
 std::optional<Plane> LargestPlane(const Cloud::Ptr& cloud, const pcl::Indices& among, const PlaneParams& params) {
   if (among.size() < 3) return std::nullopt;
@@ -96,6 +138,7 @@ void PlaneParams::Check() const {
   Require(max_iterations >= 1, "max_iterations must be >= 1", max_iterations);
   Require(step_px >= 1, "step_px must be >= 1", step_px);
   Require(min_share > 0.0 && min_share <= 1.0, "min_share must be in (0, 1]", min_share);
+  Require(std::isfinite(min_size_m) && min_size_m >= 0.0, "min_size_m must be >= 0", min_size_m);
   Require(min_up >= -1.0 && min_up <= 1.0, "min_up must be in [-1, 1]", min_up);
   Require(max_depth_m > 0.0, "max_depth_m must be > 0", max_depth_m);
 }
@@ -110,14 +153,14 @@ std::optional<Plane> FitPlane(const rgbd::Frame& frame, const PlaneParams& param
   for (int i = 0; i < kMaxPlanes; ++i) {
     std::optional<Plane> plane = LargestPlane(cloud, left, params);
     if (!plane) break;
-    pcl::Indices others;
-    for (const int index : left)
-      if (std::abs(plane->Height(At(*cloud, index))) > params.max_distance_m) others.push_back(index);
-    plane->share = static_cast<double>(left.size() - others.size()) / static_cast<double>(cloud->size());
+    pcl::Indices on, off;
+    for (const int index : left) (std::abs(plane->Height(At(*cloud, index))) > params.max_distance_m ? off : on).push_back(index);
+    plane->share = static_cast<double>(on.size()) / static_cast<double>(cloud->size());
     if (plane->share < params.min_share) break;
-    if (-plane->normal.y() >= params.min_up) return plane;
+    left = std::move(off);
+    if (Breadth(*cloud, on) < params.min_size_m) continue;
+    if (-plane->normal.y() >= params.min_up) return TableOver(*cloud, left, *plane, params).value_or(*plane);
     if (!largest) largest = plane;
-    left = std::move(others);
   }
   return largest;
 }

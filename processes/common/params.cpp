@@ -82,6 +82,7 @@ void Fields(Visitor& visit, segmentation::PlaneParams& params) {
   visit("max_iterations", params.max_iterations);
   visit("step_px", params.step_px);
   visit("min_share", params.min_share);
+  visit("min_size_m", params.min_size_m);
   visit("max_depth_m", params.max_depth_m);
   visit("min_up", params.min_up);
 }
@@ -93,6 +94,10 @@ void Fields(Visitor& visit, segmentation::ClusterParams& params) {
   visit("max_jump_m", params.max_jump_m);
   visit("bridge_px", params.bridge_px);
   visit("merge_share", params.merge_share);
+  visit("crease_arm_m", params.crease_arm_m);
+  visit("min_crease_deg", params.min_crease_deg);
+  visit("min_part_m", params.min_part_m);
+  visit("min_crease_share", params.min_crease_share);
   visit("min_size_m", params.min_size_m);
   visit("max_size_m", params.max_size_m);
   visit("min_pixels", params.min_pixels);

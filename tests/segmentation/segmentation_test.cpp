@@ -280,7 +280,7 @@ TEST(RealData, OsdObjectsThatStandApartAreFoundWhole) {
     }
   }
   EXPECT_EQ(objects, 38);
-  EXPECT_GE(found, 36);
+  EXPECT_EQ(found, 38);
 }
 
 TEST(RealData, BoardObjectsAreFoundWholeAndNothingElse) {
