@@ -38,6 +38,7 @@ std::vector<Part> FindParts(const rgbd::Frame& frame, const cv::Mat& states, con
   for (int label = 1; label <= surfaces.count; ++label) {
     if (static_cast<int>(members[label].size()) * kPiecesPerObject < params.min_pixels) continue;
     std::vector<Eigen::Vector3d> points;
+    points.reserve(members[label].size());
     for (const cv::Point& pixel : members[label]) {
       const cv::Vec3f& p = cloud.at<cv::Vec3f>(pixel);
       points.emplace_back(p[0], p[1], p[2]);

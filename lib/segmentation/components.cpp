@@ -26,18 +26,22 @@ class DisjointSets {
 
 DisjointSets Connect(const cv::Mat& states, const cv::Mat& cloud, const ClusterParams& params) {
   DisjointSets sets(states.rows * states.cols);
-  const cv::Point directions[] = {{1, 0}, {0, 1}, {1, 1}, {-1, 1}};
+  const auto join = [&](const cv::Point& from, float z, const cv::Point& direction) {
+    const int steps = StepsToNext(states, from, direction, params.bridge_px);
+    const cv::Point to = from + steps * direction;
+    if (steps == 0 || states.at<std::uint8_t>(to) != kAbove || !OnOneSurface(z, cloud.at<cv::Vec3f>(to)[2], steps, params))
+      return false;
+    sets.Unite(from.y * states.cols + from.x, to.y * states.cols + to.x);
+    return steps == 1;
+  };
   for (int y = 0; y < states.rows; ++y) {
     for (int x = 0; x < states.cols; ++x) {
       if (states.at<std::uint8_t>(y, x) != kAbove) continue;
       const float z = cloud.at<cv::Vec3f>(y, x)[2];
-      for (const cv::Point& direction : directions) {
-        const int steps = StepsToNext(states, {x, y}, direction, params.bridge_px);
-        if (steps == 0) continue;
-        const cv::Point to = cv::Point(x, y) + steps * direction;
-        if (states.at<std::uint8_t>(to) == kAbove && OnOneSurface(z, cloud.at<cv::Vec3f>(to)[2], steps, params))
-          sets.Unite(y * states.cols + x, to.y * states.cols + to.x);
-      }
+      const bool right = join({x, y}, z, {1, 0}), below = join({x, y}, z, {0, 1});
+      if (right && below) continue;  // On a closed surface these do.
+      join({x, y}, z, {1, 1});
+      join({x, y}, z, {-1, 1});
     }
   }
   return sets;

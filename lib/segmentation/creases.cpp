@@ -13,8 +13,8 @@ namespace vantage::segmentation {
 namespace {
 
 constexpr double kFocalPerPace_px = 260.0;  // Bends are looked for at every second pixel of a 640 x 480 frame.
-constexpr double kJumpPerArm = 2.0;         // Where the depth cut-off is more than so many arms, noise bends everything.
-constexpr float kFlat_deg = 12.0f;
+constexpr double kJumpPerArm = 1.5;         // Where the depth cut-off is more than so many arms, noise bends everything.
+constexpr float kFlat_deg = 15.0f;
 constexpr int kMostSteps = 30;       // Of an arm.
 constexpr float kBend_deg = 20.0f;   // From here on a pixel may be in a crease; whether it is one, its whole length says.
 constexpr float kSteep_deg = 40.0f;  // Steep ones are widened: at their ends, beside a jump, arms do not reach.
@@ -23,7 +23,7 @@ constexpr int kSeedPixels = 40;  // Fewer between creases are no surface of thei
 
 // What arms are laid on.
 struct Terrain {
-  cv::Mat states;     // CV_8UC1 of PixelState.
+  cv::Mat states;     // CV_8UC1 of PixelState; continuous, as is the next.
   cv::Mat disparity;  // CV_32FC1, 1/m, smoothed; 0 where there is no object.
   geometry::PinholeCamera camera;
 };
@@ -61,7 +61,7 @@ Terrain TerrainOf(const cv::Mat& states, const cv::Mat& cloud, const geometry::P
   for (int y = 0; y < states.rows; ++y)
     for (int x = 0; x < states.cols; ++x)
       if (states.at<std::uint8_t>(y, x) == kAbove) disparity.at<float>(y, x) = 1.0f / cloud.at<cv::Vec3f>(y, x)[2];
-  return {states, Smoothed(disparity, params), camera};
+  return {states.isContinuous() ? states : states.clone(), Smoothed(disparity, params), camera};
 }
 
 // An arm's outer half: its mean distance from where it begins, in steps (0: it does not reach), and its mean disparity.
@@ -72,14 +72,18 @@ struct Arm {
 // Along a surface, over holes, not over a jump: there an arm of half the reach will do.
 Arm LayArm(const Terrain& terrain, int x, int y, const cv::Point& direction, int reach, const ClusterParams& params) {
   std::array<float, kMostSteps + 1> laid;  // Disparity by step; 0 in a hole.
-  float last = terrain.disparity.at<float>(y, x);
+  const int room_x = direction.x > 0 ? terrain.states.cols - 1 - x : x, room_y = direction.y > 0 ? terrain.states.rows - 1 - y : y;
+  const int end = std::min({reach, direction.x ? room_x : reach, direction.y ? room_y : reach});
+  const std::ptrdiff_t stride = static_cast<std::ptrdiff_t>(direction.y) * terrain.disparity.cols + direction.x;
+  const std::ptrdiff_t start = static_cast<std::ptrdiff_t>(y) * terrain.disparity.cols + x;
+  const float* disparity = terrain.disparity.ptr<float>() + start;
+  const std::uint8_t* states = terrain.states.ptr<std::uint8_t>() + start;
+  float last = *disparity;
   int gap = 0, length = 0;
-  for (int step = 1; step <= reach; ++step) {
-    const int u = x + step * direction.x, v = y + step * direction.y;
-    if (u < 0 || v < 0 || u >= terrain.states.cols || v >= terrain.states.rows) break;
-    const float next = laid[step] = terrain.disparity.at<float>(v, u);
+  for (int step = 1; step <= end; ++step) {
+    const float next = laid[step] = disparity[step * stride];
     if (next <= 0.0f) {
-      if (terrain.states.at<std::uint8_t>(v, u) == kOther || ++gap > params.bridge_px) break;
+      if (states[step * stride] == kOther || ++gap > params.bridge_px) break;
       continue;
     }
     if (std::abs(next - last) > DisparityJump(last * next, params) * (1.0f + 0.5f * static_cast<float>(gap))) break;
@@ -177,9 +181,17 @@ void Flood(const cv::Mat& states, const cv::Mat& cloud, const cv::Mat& bend, con
       waiting[std::max(level, static_cast<int>(bend.at<float>(to)))].emplace_back(to, labels.at<int>(from));
     }
   };
-  for (int y = 0; y < labels.rows; ++y)
-    for (int x = 0; x < labels.cols; ++x)
-      if (labels.at<int>(y, x) != 0) offer({x, y}, 0);
+  // The surfaces' pixels beside creases begin.
+  const cv::Point steps_4[] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+  for (int y = 0; y < labels.rows; ++y) {
+    for (int x = 0; x < labels.cols; ++x) {
+      if (labels.at<int>(y, x) != 0 || states.at<std::uint8_t>(y, x) < kAbove) continue;
+      for (const cv::Point& direction : steps_4) {
+        const int steps = StepsToNext(states, {x, y}, direction, params.bridge_px);
+        if (steps > 0 && labels.at<int>(cv::Point(x, y) + steps * direction) != 0) offer(cv::Point(x, y) + steps * direction, 0);
+      }
+    }
+  }
   for (int level = 0; level < static_cast<int>(waiting.size()); ++level) {
     for (std::size_t i = 0; i < waiting[level].size(); ++i) {  // It may grow.
       const auto [pixel, label] = waiting[level][i];
