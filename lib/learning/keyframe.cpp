@@ -8,8 +8,11 @@
 namespace vantage::learning {
 namespace {
 
-constexpr int kCropMargin = 16;  // Pixels of surroundings kept around the object.
-constexpr int kMaskInset = 2;    // Interest points nearer to the silhouette take their depth from the edge: left out.
+constexpr int kCropMargin = 16;     // Pixels of surroundings kept around the object.
+constexpr float kMaskInset = 2.0f;  // Interest points nearer to the silhouette take their depth from the edge: left out...
+constexpr float kSizesInset =
+    1.0f;  // ...and so are those nearer to it than so many times their size: they are of the outline as much
+           // as of the object, and stay with the outline as it turns (a pixel in 10 degrees on a can).
 
 rgbd::Frame Crop(const rgbd::Frame& frame, const cv::Rect& area) {
   rgbd::Frame crop = frame;
@@ -57,9 +60,8 @@ int ClusterOfObject(const std::vector<segmentation::Cluster>& clusters, const mo
 std::optional<model::ObjectModel> WithView(const model::ObjectModel& object, const rgbd::Frame& frame, const cv::Mat& mask,
                                            const features::Features& features, const geometry::Rigid& T_camera_object,
                                            const std::vector<recognition::GuidedMatch>& links, int min_points) {
-  cv::Mat inside;
-  cv::erode(mask, inside, cv::getStructuringElement(cv::MORPH_RECT, {2 * kMaskInset + 1, 2 * kMaskInset + 1}), {-1, -1}, 1,
-            cv::BORDER_CONSTANT, cv::Scalar(0));
+  cv::Mat_<float> inset;  // Pixels from the silhouette.
+  cv::distanceTransform(mask, inset, cv::DIST_L2, cv::DIST_MASK_5);
   std::map<int, int> linked_point;
   for (const recognition::GuidedMatch& link : links) linked_point[link.keypoint] = link.point;
 
@@ -70,7 +72,8 @@ std::optional<model::ObjectModel> WithView(const model::ObjectModel& object, con
   for (int k = 0; k < features.size(); ++k) {
     const cv::Point2f& at = features.keypoints[k].pt;
     const Eigen::Vector2d pixel(at.x, at.y);
-    if (!frame.camera.Contains(pixel) || !inside.at<uchar>(cv::Point(std::lround(at.x), std::lround(at.y)))) continue;
+    const float least_inset = std::max(kMaskInset, kSizesInset * features.keypoints[k].size);
+    if (!frame.camera.Contains(pixel) || inset(cv::Point(std::lround(at.x), std::lround(at.y))) <= least_inset) continue;
     if (const auto link = linked_point.find(k); link != linked_point.end()) {
       chosen.push_back(k);
       view.points.push_back(link->second);
@@ -115,6 +118,51 @@ std::vector<pose::SurfacePoint> SurfaceOfView(const model::View& view, int count
     }
   }
   return surface;
+}
+
+std::vector<pose::TexturePoint> TextureOfView(const model::View& view, int count) {
+  constexpr double kCandidates = 8.0;   // Pixels that are looked at for each point wanted.
+  constexpr double kMinGradient = 4.0;  // Grey levels per pixel of the smoothed image.
+  constexpr double kMinCosine = 0.6;    // Between normal and ray: what is seen slantwise is smeared.
+  constexpr int kInset = 4;             // Nearer to the silhouette its smoothed image has some of the background.
+  std::vector<pose::TexturePoint> texture;
+  if (view.keyframe.depth.empty() || count <= 0) return texture;
+  cv::Mat inside;
+  cv::erode(view.mask, inside, cv::getStructuringElement(cv::MORPH_RECT, {2 * kInset + 1, 2 * kInset + 1}), {-1, -1}, 1,
+            cv::BORDER_CONSTANT, cv::Scalar(0));
+  const pose::SmoothImage image(view.keyframe, cv::Rect({0, 0}, view.mask.size()));
+  std::vector<std::pair<Eigen::Vector2d, double>> edges;
+  const int grid_px = std::max(1, static_cast<int>(std::sqrt(cv::countNonZero(inside) / (kCandidates * count))));
+  for (int y = 0; y < inside.rows; y += grid_px) {
+    for (int x = 0; x < inside.cols; x += grid_px) {
+      if (!inside.at<uchar>(y, x)) continue;
+      const auto sample = image.At({x, y});
+      if (sample && sample->gradient.norm() >= kMinGradient) edges.emplace_back(Eigen::Vector2d(x, y), sample->brightness);
+    }
+  }
+  const geometry::Rigid T_object_camera = view.T_camera_object.inverse();
+  const double step = std::max(1.0, static_cast<double>(edges.size()) / count);
+  for (double at = 0.0; at < static_cast<double>(edges.size()); at += step) {
+    const auto& [pixel, brightness] = edges[static_cast<std::size_t>(at)];
+    const auto point = rgbd::PointAt(view.keyframe, pixel, 1);
+    const auto normal = rgbd::NormalAt(view.keyframe, pixel);
+    if (point && normal && -normal->dot(point->normalized()) >= kMinCosine)
+      texture.push_back({T_object_camera * *point, T_object_camera.linear() * *normal, brightness});
+  }
+  return texture;
+}
+
+pose::Appearance AppearanceNear(const model::ObjectModel& object, const geometry::Rigid& T_camera_object, int views,
+                                int surface_samples, int texture_samples) {
+  pose::Appearance appearance;
+  const std::vector<int> nearest = model::NearestViews(object, T_camera_object, views);
+  const int count = std::max<int>(1, nearest.size());
+  for (const int view : nearest) {
+    const auto part = SurfaceOfView(object.views[view], surface_samples / count);
+    appearance.surface.insert(appearance.surface.end(), part.begin(), part.end());
+    appearance.textures.push_back(TextureOfView(object.views[view], texture_samples / count));
+  }
+  return appearance;
 }
 
 }  // namespace vantage::learning

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "model/object_model.h"
-#include "pose/refine.h"
+#include "pose/dense.h"
 #include "recognition/guided.h"
 #include "segmentation/clusters.h"
 
@@ -28,5 +28,13 @@ std::optional<model::ObjectModel> WithView(const model::ObjectModel& object, con
 
 // About `count` points of the surface that a view's depth image shows, object frame. Empty where it has no depth.
 std::vector<pose::SurfacePoint> SurfaceOfView(const model::View& view, int count);
+
+// About `count` points of it where brightness changes, with the brightness the view's (smoothed) image has there, object frame.
+// Fewer where the object is plain; empty where the view has no depth.
+std::vector<pose::TexturePoint> TextureOfView(const model::View& view, int count);
+
+// Both, of the views nearest to a pose.
+pose::Appearance AppearanceNear(const model::ObjectModel& object, const geometry::Rigid& T_camera_object, int views,
+                                int surface_samples, int texture_samples);
 
 }  // namespace vantage::learning

@@ -20,6 +20,7 @@ void LearnerParams::Check() const {
   require(min_view_points >= 4, "min_view_points must be >= 4");
   require(min_view_angle_deg >= 0.0, "min_view_angle_deg must be >= 0");
   require(surface_samples >= 0, "surface_samples must be >= 0");
+  require(texture_samples >= 0, "texture_samples must be >= 0");
   require(surface_views >= 1, "surface_views must be >= 1");
   require(max_spread_m > 0.0, "max_spread_m must be > 0");
   require(max_spread_deg > 0.0, "max_spread_deg must be > 0");

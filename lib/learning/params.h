@@ -27,7 +27,8 @@ struct LearnerParams {
   double roi_margin = 0.25;         // Interest points are sought this share of the object's size around where it was; >= 0...
   double min_roi_margin_px = 10.0;  // ...or this far (and thrice the last error) around where its motion leads; >= 0.
   int surface_samples = 1000;       // Points of the learned surface that are drawn to the depth image; 0 = none.
-  int surface_views = 3;            // ...taken from so many nearest views; >= 1.
+  int texture_samples = 600;        // Likewise of its texture, drawn to the colour image; 0 = none.
+  int surface_views = 3;            // Both are taken from so many nearest views; >= 1.
   double agreement_prior = 0.9;     // p(o) of a pose found without the mount (or the last frames) that agrees with it; [1/2, 1).
   // Refinement, beside tracking:
   bool refine = true;            // Loops closed, views and points adjusted, the model tidied up.

@@ -85,38 +85,51 @@ std::vector<Kin> ByKinship(const model::ObjectModel& object, int view, int count
   return kin;
 }
 
-std::vector<pose::SurfacePoint> SurfaceInCamera(model::View view, int count) {
+// What a view shows, in its camera's coordinates.
+pose::Appearance AppearanceInCamera(model::View view, const RefinementParams& params) {
   view.T_camera_object = geometry::Rigid::Identity();
-  return SurfaceOfView(view, count);
+  pose::Appearance appearance;
+  if (params.use_depth) appearance.surface = SurfaceOfView(view, params.surface_samples);
+  appearance.textures.push_back(TextureOfView(view, params.texture_samples));
+  return appearance;
 }
 
-// The depth images of free views fitted to those of the views that share most points with them, from where the problem has them.
-// Both ways, since each sees the other's surface where it is seen best.
-std::vector<pose::BundleRelation> SurfaceRelations(const model::ObjectModel& object, const pose::BundleProblem& problem,
-                                                   int first_free_view, const RefinementParams& params) {
+// Which views are held against which: free ones against those that share most points with them. Both ways, since each sees the
+// other's appearance where it is seen best; where depth must not place a view, older ones' against newer images only.
+std::set<std::pair<int, int>> PairsToRelate(const model::ObjectModel& object, int first_free_view, const RefinementParams& params) {
   const int count = static_cast<int>(object.views.size());
   std::set<std::pair<int, int>> pairs;
   for (int v = first_free_view; v < count; ++v) {
     const std::vector<Kin> kin = ByKinship(object, v, count);
     for (int i = 0; i < std::min(params.surface_neighbours, static_cast<int>(kin.size())); ++i) {
       if (kin[i].shared < params.min_shared_points) break;
-      pairs.insert({v, kin[i].view});
-      pairs.insert({kin[i].view, v});
+      pairs.insert({std::min(v, kin[i].view), std::max(v, kin[i].view)});
+      if (params.use_depth) pairs.insert({std::max(v, kin[i].view), std::min(v, kin[i].view)});
     }
   }
+  return pairs;
+}
+
+// Depth and colour images of free views fitted to those of the views that share most points with them, from where the problem has
+// them.
+std::vector<pose::BundleRelation> RelationsOf(const model::ObjectModel& object, const pose::BundleProblem& problem,
+                                              int first_free_view, const RefinementParams& params) {
   std::vector<pose::BundleRelation> relations;
-  std::vector<pose::SurfacePoint> surface;  // In camera coordinates of view a; pairs come sorted by a.
-  int surface_of = -1;
-  for (const auto& [a, b] : pairs) {
-    if (surface_of != a) {
-      surface = SurfaceInCamera(object.views[a], params.surface_samples);
-      surface_of = a;
+  pose::Appearance appearance;  // Of view a; pairs come sorted by a.
+  int appearance_of = -1;
+  for (const auto& [a, b] : PairsToRelate(object, first_free_view, params)) {
+    if (appearance_of != a) {
+      appearance = AppearanceInCamera(object.views[a], params);
+      appearance_of = a;
     }
+    rgbd::Frame frame = object.views[b].keyframe;
+    if (!params.use_depth) frame.depth = cv::Mat();
+    const pose::SmoothImage image(frame, cv::Rect({0, 0}, frame.color.size()));
     const geometry::Rigid T_b_a = problem.views[b].T_camera_object * problem.views[a].T_camera_object.inverse();
-    const pose::SurfaceFit fit = pose::FitSurface(surface, object.views[b].keyframe, T_b_a, params.independent_samples);
-    if (fit.samples < params.surface_samples / 4) continue;
-    // How far the fit moves the middle of the surface.
-    const Eigen::Vector3d middle = surface[surface.size() / 2].point;
+    const pose::DenseFit fit = pose::FitDensely(appearance, frame, &image, T_b_a, params.dense);
+    if (4 * fit.samples < params.surface_samples && 4 * fit.texture_samples < params.texture_samples) continue;
+    // How far the fit moves what the view is looking at.
+    const Eigen::Vector3d middle(0.0, 0.0, object.views[a].T_camera_object.translation().z());
     if ((fit.T_camera_object * middle - T_b_a * middle).norm() > params.max_surface_move_m) continue;
     relations.push_back({a, b, fit.T_camera_object, fit.information});
   }
@@ -173,13 +186,14 @@ std::vector<int> PointsGoneTo(const model::ObjectModel& base, const model::Objec
 
 void RefinementParams::Check() const {
   bundle.Check();
+  dense.Check();
   const auto require = [](bool ok, const char* what) {
     if (!ok) throw std::invalid_argument(std::string("refinement: ") + what);
   };
   require(surface_samples >= 0, "surface_samples must be >= 0");
+  require(texture_samples >= 0, "texture_samples must be >= 0");
   require(surface_neighbours >= 1, "surface_neighbours must be >= 1");
   require(min_shared_points >= 1, "min_shared_points must be >= 1");
-  require(independent_samples > 0.0, "independent_samples must be > 0");
   require(max_surface_move_m > 0.0, "max_surface_move_m must be > 0");
   require(max_link_error_sigmas > 0.0, "max_link_error_sigmas must be > 0");
 }
@@ -196,11 +210,11 @@ model::ObjectModel Refined(const model::ObjectModel& object, int first_free_view
   const Sightings sightings(object);
   pose::BundleProblem problem = ProblemOf(object, sightings, first_free_view, params.use_depth, priors);
   pose::BundleParams coarse = params.bundle;
-  const bool with_surfaces = params.use_depth && params.surface_samples > 0;
-  if (with_surfaces) coarse.tolerance *= 10.0;  // It is only where surfaces start from.
+  const bool related = (params.use_depth && params.surface_samples > 0) || params.texture_samples > 0;
+  if (related) coarse.tolerance *= 10.0;  // It is only where relations start from.
   report->bundle = pose::AdjustBundle(&problem, coarse);
-  if (with_surfaces) {
-    problem.relations = SurfaceRelations(object, problem, first_free_view, params);
+  if (related) {
+    problem.relations = RelationsOf(object, problem, first_free_view, params);
     const pose::BundleReport points_alone = report->bundle;
     pose::BundleParams fine = params.bundle;
     fine.max_anneal = 1.0;  // The start is good.

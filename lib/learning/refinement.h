@@ -8,18 +8,19 @@
 
 #include "model/object_model.h"
 #include "pose/bundle.h"
+#include "pose/dense.h"
 
 namespace vantage::learning {
 
 struct RefinementParams {
   pose::BundleParams bundle;
-  int surface_samples = 300;           // Of each view's depth, drawn to its neighbours' depth images; 0 = points alone.
-  int surface_neighbours = 4;          // A free view is held against so many others, those that share most points; >= 1.
+  pose::DenseParams dense;
+  int surface_samples = 300;           // Of each view's depth, drawn to its neighbours' depth images; 0 = none.
+  int texture_samples = 600;           // Of each view's texture, drawn to its neighbours' colour images; 0 = none.
+  int surface_neighbours = 6;          // A free view is held against so many others, those that share most points; >= 1.
   int min_shared_points = 6;           // ...if they share so many; >= 1.
-  double independent_samples = 100.0;  // Depths err together: the surface weighs as so many samples at most; > 0.
-  double max_surface_move_m =
-      0.008;              // A surface that wants a pair of views further from where points put them is not believed; > 0.
-  bool use_depth = true;  // false: only the first view's is used (it gives the scale), all else is pixels.
+  double max_surface_move_m = 0.008;   // What wants a pair of views further from where points put them is not believed; > 0.
+  bool use_depth = true;               // false: only the first view's is used (it gives the scale), all else is pixels.
   double max_link_error_sigmas = 8.0;  // A view that is so far off from a point it is said to see saw another one; > 0.
 
   void Check() const;  // Throws std::invalid_argument naming the field.

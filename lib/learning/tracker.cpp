@@ -31,32 +31,38 @@ cv::Mat Widened(const std::vector<cv::Point>& hull, int margin, const geometry::
   return mask;
 }
 
-std::vector<pose::SurfacePoint> SurfaceNear(const model::ObjectModel& object, const geometry::Rigid& T_camera_object, int views,
-                                            int samples) {
-  std::vector<pose::SurfacePoint> surface;
-  const std::vector<int> nearest = model::NearestViews(object, T_camera_object, views);
-  for (const int view : nearest) {
-    const auto part = SurfaceOfView(object.views[view], samples / static_cast<int>(nearest.size()));
-    surface.insert(surface.end(), part.begin(), part.end());
-  }
-  return surface;
-}
+}  // namespace
 
-pose::PoseSpread SpreadOf(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
-                          const Track& track) {
-  constexpr double kPixelSigma = 1.0;
+// All that a frame says about the pose of an object that was found in it.
+struct Tracker::Evidence {
   std::vector<pose::Match2d3d> matches;
-  std::vector<int> all;
-  for (const recognition::GuidedMatch& match : track.matches) {
+  std::vector<int> all;  // Their indices.
+  pose::Appearance appearance;
+  std::optional<pose::SmoothImage> image;  // Where the object is; none where texture is not wanted.
+
+  const pose::SmoothImage* smooth() const { return image ? &*image : nullptr; }
+};
+
+Tracker::Evidence Tracker::EvidenceIn(const rgbd::Frame& frame, const features::Features& features,
+                                      const model::ObjectModel& object, const recognition::GuidedPose& guided) const {
+  constexpr int kMargin_px = 20;  // Around the outline.
+  Evidence evidence;
+  for (const recognition::GuidedMatch& match : guided.matches) {
     const cv::Point2f& at = features.keypoints[match.keypoint].pt;
     const Eigen::Vector2d pixel(at.x, at.y);
-    all.push_back(static_cast<int>(matches.size()));
-    matches.push_back({pixel, object.points[match.point].position, rgbd::DepthAt(frame, pixel).value_or(0.0)});
+    evidence.all.push_back(static_cast<int>(evidence.matches.size()));
+    evidence.matches.push_back({pixel, object.points[match.point].position, rgbd::DepthAt(frame, pixel).value_or(0.0)});
   }
-  return pose::SpreadOfPose(matches, all, frame.camera, track.T_camera_object, kPixelSigma);
+  evidence.appearance = AppearanceNear(object, guided.T_camera_object, params_.surface_views,
+                                       frame.depth.empty() ? 0 : params_.surface_samples, params_.texture_samples);
+  const std::vector<cv::Point> hull = Outline(object, frame.camera, guided.T_camera_object);
+  if (params_.texture_samples > 0 && !hull.empty()) {
+    const cv::Rect box = cv::boundingRect(hull);
+    evidence.image.emplace(
+        frame, cv::Rect(box.x - kMargin_px, box.y - kMargin_px, box.width + 2 * kMargin_px, box.height + 2 * kMargin_px));
+  }
+  return evidence;
 }
-
-}  // namespace
 
 features::Features Tracker::ExtractAround(const model::ObjectModel& object, const rgbd::Frame& frame,
                                           const Expectation& expectation) const {
@@ -73,26 +79,24 @@ bool Tracker::Agree(const geometry::Rigid& T_camera_object_a, const geometry::Ri
          difference.rotation_rad <= params_.max_mount_rotation_deg * M_PI / 180.0;
 }
 
-geometry::Rigid Tracker::Refined(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
-                                 const recognition::GuidedPose& guided, const std::optional<geometry::Rigid>& mount_pose) const {
-  std::vector<pose::Match2d3d> matches;
-  std::vector<int> all;
-  for (const recognition::GuidedMatch& match : guided.matches) {
-    const cv::Point2f& pixel = features.keypoints[match.keypoint].pt;
-    all.push_back(static_cast<int>(matches.size()));
-    matches.push_back({{pixel.x, pixel.y}, object.points[match.point].position, 0.0});
-  }
-  std::vector<pose::SurfacePoint> surface;
-  if (!frame.depth.empty() && params_.surface_samples > 0) {
-    surface = SurfaceNear(object, guided.T_camera_object, params_.surface_views, params_.surface_samples);
-  }
+geometry::Rigid Tracker::Refined(const rgbd::Frame& frame, const Evidence& evidence, const geometry::Rigid& T_camera_object,
+                                 const std::optional<geometry::Rigid>& mount_pose) const {
   std::optional<pose::PosePrior> prior;
-  if (mount_pose && Agree(guided.T_camera_object, *mount_pose)) {
+  if (mount_pose && Agree(T_camera_object, *mount_pose)) {
     prior = pose::PosePrior{*mount_pose, params_.mount_sigma_m, params_.mount_sigma_deg * M_PI / 180.0};
   }
-  if (surface.empty() && !prior) return guided.T_camera_object;
-  return pose::RefinePoseOnSurface(matches, all, surface, frame, prior, guided.T_camera_object,
-                                   0.5 * params_.recogniser.ransac.inlier_px);
+  std::vector<pose::Match2d3d> matches = evidence.matches;
+  for (pose::Match2d3d& match : matches) match.depth_m = 0.0;  // The surface says it.
+  return pose::RefinePoseDensely(matches, evidence.all, evidence.appearance, frame, evidence.smooth(), prior, T_camera_object,
+                                 0.5 * params_.recogniser.ransac.inlier_px, params_.refinement.dense);
+}
+
+pose::PoseSpread Tracker::SpreadAt(const rgbd::Frame& frame, const Evidence& evidence,
+                                   const geometry::Rigid& T_camera_object) const {
+  constexpr double kPixelSigma = 1.0;
+  const pose::DenseFit dense =
+      pose::FitDensely(evidence.appearance, frame, evidence.smooth(), T_camera_object, params_.refinement.dense, 0);
+  return pose::SpreadOfPose(evidence.matches, evidence.all, frame.camera, T_camera_object, kPixelSigma, dense.information);
 }
 
 Track Tracker::At(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
@@ -108,10 +112,11 @@ Track Tracker::At(const model::ObjectModel& object, const rgbd::Frame& frame, co
   const auto guided = recognition::MatchGuided(object, T_camera_object, query, features, grid, guided_params);
   Track track;
   track.matches = guided.matches;
-  track.T_camera_object = refine ? Refined(object, query, features, guided, mount_pose) : T_camera_object;
+  const Evidence evidence = EvidenceIn(query, features, object, guided);
+  track.T_camera_object = refine ? Refined(query, evidence, guided.T_camera_object, mount_pose) : T_camera_object;
   track.confidence = model::ObjectConfidence(object, track.T_camera_object, query, grid, recogniser.confidence);
   track.probability = object.measures.observed.Probability(track.confidence.value);
-  track.spread = SpreadOf(object, query, features, track);
+  track.spread = SpreadAt(query, evidence, track.T_camera_object);
   track.features = features;
   return track;
 }

@@ -42,15 +42,20 @@ class Tracker {
   std::optional<Track> AgainstView(const model::ObjectModel& object, int view, const rgbd::Frame& frame,
                                    const features::Features& features, const std::optional<geometry::Rigid>& mount_pose) const;
 
-  // Guided matches, confidence and p(o|c) at a pose; `refine` lets the pose follow the matches, the depth image and the mount.
+  // Guided matches, confidence and p(o|c) at a pose; `refine` lets the pose follow the matches, the depth image, the colour image
+  // and the mount.
   Track At(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
            const geometry::Rigid& T_camera_object, bool refine, const std::optional<geometry::Rigid>& mount_pose) const;
 
   bool Agree(const geometry::Rigid& T_camera_object_a, const geometry::Rigid& T_camera_object_b) const;
 
  private:
-  geometry::Rigid Refined(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
-                          const recognition::GuidedPose& guided, const std::optional<geometry::Rigid>& mount_pose) const;
+  struct Evidence;
+  Evidence EvidenceIn(const rgbd::Frame& frame, const features::Features& features, const model::ObjectModel& object,
+                      const recognition::GuidedPose& guided) const;
+  geometry::Rigid Refined(const rgbd::Frame& frame, const Evidence& evidence, const geometry::Rigid& T_camera_object,
+                          const std::optional<geometry::Rigid>& mount_pose) const;
+  pose::PoseSpread SpreadAt(const rgbd::Frame& frame, const Evidence& evidence, const geometry::Rigid& T_camera_object) const;
 
   LearnerParams params_;
 };

@@ -10,21 +10,14 @@
 #include <cmath>
 
 #include "pose/bundle.h"
+#include "pose/normal_equations.h"
 
 namespace vantage::pose {
 
 constexpr double kMinDepth = 1e-3;     // Nearer points are behind the camera.
 constexpr double kBehindSigmas = 1e3;  // The error of a point behind the camera: flat, so that nothing pulls on it.
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-
 using PoseBlock = std::array<double, 7>;  // Quaternion x y z w, translation: of T_camera_object.
-
-inline Eigen::Matrix3d Cross(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
 
 inline PoseBlock BlockOf(const geometry::Rigid& T) {
   const Eigen::Quaterniond q(T.linear());

@@ -120,12 +120,19 @@ void Fields(Visitor& visit, pose::BundleParams& params) {
 }
 
 template <typename Visitor>
+void Fields(Visitor& visit, pose::DenseParams& params) {
+  visit("independent_matches", params.independent_matches);
+  visit("min_texture_sigma", params.min_texture_sigma);
+}
+
+template <typename Visitor>
 void Fields(Visitor& visit, learning::RefinementParams& params) {
   visit.Nested("bundle", params.bundle);
+  visit.Nested("dense", params.dense);
   visit("surface_samples", params.surface_samples);
+  visit("texture_samples", params.texture_samples);
   visit("surface_neighbours", params.surface_neighbours);
   visit("min_shared_points", params.min_shared_points);
-  visit("independent_samples", params.independent_samples);
   visit("max_surface_move_m", params.max_surface_move_m);
   visit("use_depth", params.use_depth);
   visit("max_link_error_sigmas", params.max_link_error_sigmas);
@@ -177,6 +184,7 @@ void Fields(Visitor& visit, learning::LearnerParams& params) {
   visit("roi_margin", params.roi_margin);
   visit("min_roi_margin_px", params.min_roi_margin_px);
   visit("surface_samples", params.surface_samples);
+  visit("texture_samples", params.texture_samples);
   visit("surface_views", params.surface_views);
   visit("agreement_prior", params.agreement_prior);
   visit("refine", params.refine);

@@ -45,7 +45,7 @@ class ViewKeeper {
     }
   }
 
-  // The newest view, durably; the first one replaces what the store knew under that name.
+  // The model as it is now, durably; with its first view it replaces what the store knew under that name.
   void Keep(const model::ObjectModel& object) {
     if (!store_) store_.emplace(file_, model::Store::Mode::kWrite);
     const int newest = static_cast<int>(object.views.size()) - 1;
@@ -96,6 +96,7 @@ class LearnRun {
       throw std::runtime_error(options_.sequence + ": no object was found in " + std::to_string(ids_.size()) + " frames (" +
                                tally_.note + "); say which one with --object-pixel U,V or take other --frames");
     }
+    if (learner_.FinishRefinement()) keeper_.Keep(*learner_.object());
   }
 
   Json Result() const {
@@ -159,7 +160,7 @@ class LearnRun {
     const bool tracked = step.state == learning::State::kTracking && step.T_camera_object;
     if (tracked) ++tally_.tracked;
     if (reference_ && !tracked) ++tally_.lost;
-    if (step.view_added) keeper_.Keep(*learner_.object());
+    if (step.view_added || step.refined) keeper_.Keep(*learner_.object());
     if (tracked && T_camera_reference && !options_.use_known_poses) {
       JudgeMotion(*step.T_camera_object, *reference_, *T_camera_reference, tally_);
     }

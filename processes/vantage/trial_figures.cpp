@@ -84,7 +84,8 @@ std::string Quoted(std::string text) {
 std::string FrameTable(const LearnerTrial& trial) {
   std::ostringstream table;
   table.precision(6);
-  table << "frame,time_s,circle,faulty,usable,state,tracked,wrong,error_mm,error_deg,confidence,probability,inliers,reference_view,"
+  table << "frame,time_s,circle,faulty,usable,state,tracked,wrong,error_mm,error_deg,confidence,probability,inliers,spread_mm,"
+           "spread_deg,reference_view,"
            "view_added,views,points,ms,cpu_ms,memory_mb,note\n";
   for (const TrialStep& step : trial.steps()) {
     const learning::LearnerResult& result = step.result;
@@ -94,8 +95,9 @@ std::string FrameTable(const LearnerTrial& trial) {
       table << step.error->translation_mm << ',' << step.error->rotation_deg;
     else
       table << "NaN,NaN";
-    table << ',' << result.confidence.value << ',' << result.probability << ',' << result.inliers << ',' << result.reference_view
-          << ',' << result.view_added << ',' << step.views << ',' << step.points << ',' << step.ms << ',' << step.cpu_ms << ','
+    table << ',' << result.confidence.value << ',' << result.probability << ',' << result.inliers << ','
+          << 1e3 * result.spread.sigma_m << ',' << result.spread.sigma_rad * 180.0 / M_PI << ',' << result.reference_view << ','
+          << result.view_added << ',' << step.views << ',' << step.points << ',' << step.ms << ',' << step.cpu_ms << ','
           << step.memory_mb << ',' << Quoted(result.note) << '\n';
   }
   return table.str();

@@ -6,6 +6,7 @@
 #include <random>
 #include <utility>
 
+#include "pose/dense.h"
 #include "pose/p3p.h"
 #include "pose/ransac.h"
 #include "pose/refine.h"
@@ -138,7 +139,7 @@ TEST(Refine, ASurfaceFindsThePoseAndSaysWhatItDoesNotKnow) {
     geometry::Rigid start = geometry::Rigid::Identity();
     start.translation() = Eigen::Vector3d(0.004, -0.003, 0.005);
     start.rotate(Eigen::AngleAxisd(0.01, Eigen::Vector3d(0.3, 1, 0.2).normalized()));
-    const SurfaceFit fit = FitSurface(surface, frame, start, 100.0);
+    const DenseFit fit = FitDensely({surface, {}}, frame, nullptr, start, {});
     EXPECT_GT(fit.samples, 100);
     const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(fit.information).eigenvalues();
     const Eigen::Vector3d middle(0, 0, 0.5);
@@ -153,7 +154,7 @@ TEST(Refine, ASurfaceFindsThePoseAndSaysWhatItDoesNotKnow) {
       EXPECT_LT(eigenvalues(2), 1e-6 * eigenvalues(5));
     }
   }
-  EXPECT_EQ(FitSurface({}, frame, geometry::Rigid::Identity(), 100.0).samples, 0);
+  EXPECT_EQ(FitDensely({}, frame, nullptr, geometry::Rigid::Identity(), {}).samples, 0);
 }
 
 // Monte Carlo: the spread told is the spread seen, and few points on a small flat part hold a pose badly.
