@@ -270,7 +270,8 @@ struct Learner::Impl {
     const auto expectation = Expected(frame);
     if (expectation && reference_view >= 0) {
       if (auto track = Follow(frame, *expectation)) {
-        return Found{std::move(*track), IsNear(frame, *expectation, track->T_camera_object)};
+        const bool near = IsNear(frame, *expectation, track->T_camera_object);
+        return Found{std::move(*track), near};
       }
     }
     if (auto track = Relocalise(frame)) return Found{std::move(*track), false};
@@ -345,7 +346,7 @@ struct Learner::Impl {
   }
 
   void StartRefinement() {
-    if (params.refine) refiner.StartIfDue(frame_number, object, statistics, MountPriors());
+    if (params.refine && refiner.IsDue()) refiner.Start(frame_number, object, statistics, MountPriors());
   }
 
   // The refined model, with what was learned since, in place of the one there is.
@@ -395,8 +396,9 @@ struct Learner::Impl {
 
   bool IsHeld(const rgbd::Frame& frame, const Track& track) const {
     const auto mount_pose = MountPose(frame);
-    return (track.spread.sigma_m <= params.max_spread_m && track.spread.sigma_rad <= params.max_spread_deg * M_PI / 180.0) ||
-           (mount_pose && tracker.Agree(track.T_camera_object, *mount_pose));
+    if (mount_pose && tracker.Agree(track.T_camera_object, *mount_pose)) return true;
+    return static_cast<int>(track.matches.size()) >= params.min_links && track.spread.sigma_m <= params.max_spread_m &&
+           track.spread.sigma_rad <= params.max_spread_deg * M_PI / 180.0 && track.likeness.value_or(1.0) >= params.min_likeness;
   }
 
   // The less of the object is recognised, the nearer to a learned view a new one may be.
@@ -461,6 +463,7 @@ struct Learner::Impl {
     result.probability = track.probability;
     result.inliers = static_cast<int>(track.matches.size());
     result.spread = track.spread;
+    result.likeness = track.likeness;
     if (!known_pose && ContradictsMount(frame, track.T_camera_object) && !WasMoved(frame, track)) {
       return Lose(result, "the track contradicts the mount's pose");
     }

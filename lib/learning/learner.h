@@ -28,7 +28,8 @@ struct LearnerResult {
   double probability = 0.0;  // p(o|c).
   int reference_view = -1;   // Index of the tracked view.
   int inliers = 0;
-  pose::PoseSpread spread;  // How well the matches hold the pose.
+  pose::PoseSpread spread;         // As of Track.
+  std::optional<double> likeness;  // As of Track.
   bool view_added = false;
   bool refined = false;  // A refinement took effect in this frame: points and poses of the model have moved.
   std::string note;      // Why nothing was learned, in a few words; empty where there is nothing to say.

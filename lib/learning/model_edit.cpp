@@ -1,5 +1,7 @@
 #include "learning/model_edit.h"
 
+#include <algorithm>
+
 namespace vantage::learning {
 
 std::vector<int> DropUnusedPoints(model::ObjectModel* object) {
@@ -31,6 +33,12 @@ void KeepKeypoints(const std::vector<int>& kept, model::View* view) {
 Eigen::Vector2d PixelOf(const model::View& view, int keypoint) {
   const cv::Point2f& pixel = view.features.keypoints[keypoint].pt;
   return {pixel.x, pixel.y};
+}
+
+int IndexOfView(const model::ObjectModel& object, int id) {
+  const auto found = std::lower_bound(object.views.begin(), object.views.end(), id,
+                                      [](const model::View& view, int wanted) { return view.id < wanted; });
+  return found != object.views.end() && found->id == id ? static_cast<int>(found - object.views.begin()) : -1;
 }
 
 }  // namespace vantage::learning

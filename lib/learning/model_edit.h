@@ -16,4 +16,7 @@ void KeepKeypoints(const std::vector<int>& kept, model::View* view);
 // Pixel of a view's keypoint.
 Eigen::Vector2d PixelOf(const model::View& view, int keypoint);
 
+// Where the view with this id is among the views (their ids rise); -1 where it is gone.
+int IndexOfView(const model::ObjectModel& object, int id);
+
 }  // namespace vantage::learning

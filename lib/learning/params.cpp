@@ -24,6 +24,8 @@ void LearnerParams::Check() const {
   require(surface_views >= 1, "surface_views must be >= 1");
   require(max_spread_m > 0.0, "max_spread_m must be > 0");
   require(max_spread_deg > 0.0, "max_spread_deg must be > 0");
+  require(min_links >= 3, "min_links must be >= 3");
+  require(min_likeness >= -1.0 && min_likeness <= 1.0, "min_likeness must be in [-1, 1]");
   require(neighbour_views >= 0, "neighbour_views must be >= 0");
   require(roi_margin >= 0.0, "roi_margin must be >= 0");
   require(min_roi_margin_px >= 0.0, "min_roi_margin_px must be >= 0");

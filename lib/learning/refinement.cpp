@@ -148,12 +148,6 @@ void MoveBy(const geometry::Rigid& T, model::ModelPoint* point) {
 
 // --- Rebased ---
 
-int IndexOfView(const model::ObjectModel& object, int id) {
-  const auto found = std::lower_bound(object.views.begin(), object.views.end(), id,
-                                      [](const model::View& view, int wanted) { return view.id < wanted; });
-  return found != object.views.end() && found->id == id ? static_cast<int>(found - object.views.begin()) : -1;
-}
-
 void RequireAppended(const model::ObjectModel& base, const model::ObjectModel& current) {
   bool same = current.views.size() >= base.views.size() && current.points.size() >= base.points.size();
   for (size_t v = 0; same && v < base.views.size(); ++v) {

@@ -7,13 +7,6 @@
 namespace vantage::learning {
 namespace {
 
-int IndexOfView(const model::ObjectModel& object, int id) {
-  for (size_t i = 0; i < object.views.size(); ++i) {
-    if (object.views[i].id == id) return static_cast<int>(i);
-  }
-  return -1;
-}
-
 // How many of a view's keypoints are points that other views see too.
 int SharedPoints(const model::ObjectModel& object, int view) {
   std::vector<bool> elsewhere(object.points.size(), false);
@@ -89,9 +82,8 @@ Refinement Refiner::RefineAll(const std::shared_ptr<const model::ObjectModel>& o
   return result;
 }
 
-void Refiner::StartIfDue(std::int64_t frame, const std::shared_ptr<const model::ObjectModel>& object,
-                         const std::vector<PointStatistics>& statistics, const std::map<int, pose::PosePrior>& priors) {
-  if (new_views_.empty() || job_.busy()) return;
+void Refiner::Start(std::int64_t frame, const std::shared_ptr<const model::ObjectModel>& object,
+                    const std::vector<PointStatistics>& statistics, const std::map<int, pose::PosePrior>& priors) {
   job_.Start(frame + params_.refine_delay_frames,
              [job = Job{object, std::move(new_views_), statistics, priors, params_}] { return job.Run(); });
   new_views_.clear();

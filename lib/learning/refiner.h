@@ -33,10 +33,11 @@ class Refiner {
   }
   int views_added() const { return views_added_; }  // Since the beginning.
 
-  // Starts a job for the views added since the last one; does nothing where there are none or a job is under way. `statistics`: one
-  // per point. `priors`: where the mount says the object is, by view id.
-  void StartIfDue(std::int64_t frame, const std::shared_ptr<const model::ObjectModel>& object,
-                  const std::vector<PointStatistics>& statistics, const std::map<int, pose::PosePrior>& priors);
+  // Whether views were added since the last job, and none is under way.
+  bool IsDue() const { return !new_views_.empty() && !job_.busy(); }
+  // Starts a job for them. `statistics`: one per point. `priors`: where the mount says the object is, by view id.
+  void Start(std::int64_t frame, const std::shared_ptr<const model::ObjectModel>& object,
+             const std::vector<PointStatistics>& statistics, const std::map<int, pose::PosePrior>& priors);
 
   // The result, at the frame where it takes effect; waits for it where it is not there by then.
   std::optional<Refinement> Take(std::int64_t frame) { return job_.Take(frame); }

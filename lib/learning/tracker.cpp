@@ -91,12 +91,13 @@ geometry::Rigid Tracker::Refined(const rgbd::Frame& frame, const Evidence& evide
                                  0.5 * params_.recogniser.ransac.inlier_px, params_.refinement.dense);
 }
 
-pose::PoseSpread Tracker::SpreadAt(const rgbd::Frame& frame, const Evidence& evidence,
-                                   const geometry::Rigid& T_camera_object) const {
+void Tracker::Weigh(const rgbd::Frame& frame, const Evidence& evidence, Track* track) const {
   constexpr double kPixelSigma = 1.0;
   const pose::DenseFit dense =
-      pose::FitDensely(evidence.appearance, frame, evidence.smooth(), T_camera_object, params_.refinement.dense, 0);
-  return pose::SpreadOfPose(evidence.matches, evidence.all, frame.camera, T_camera_object, kPixelSigma, dense.information);
+      pose::FitDensely(evidence.appearance, frame, evidence.smooth(), track->T_camera_object, params_.refinement.dense, 0);
+  track->likeness = dense.likeness;
+  track->spread =
+      pose::SpreadOfPose(evidence.matches, evidence.all, frame.camera, track->T_camera_object, kPixelSigma, dense.information);
 }
 
 Track Tracker::At(const model::ObjectModel& object, const rgbd::Frame& frame, const features::Features& features,
@@ -116,7 +117,7 @@ Track Tracker::At(const model::ObjectModel& object, const rgbd::Frame& frame, co
   track.T_camera_object = refine ? Refined(query, evidence, guided.T_camera_object, mount_pose) : T_camera_object;
   track.confidence = model::ObjectConfidence(object, track.T_camera_object, query, grid, recogniser.confidence);
   track.probability = object.measures.observed.Probability(track.confidence.value);
-  track.spread = SpreadAt(query, evidence, track.T_camera_object);
+  Weigh(query, evidence, &track);
   track.features = features;
   return track;
 }

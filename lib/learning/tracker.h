@@ -19,8 +19,9 @@ struct Track {
   features::Features features;  // Of the frame, where the object was sought.
   std::vector<recognition::GuidedMatch> matches;
   model::Confidence confidence;
-  double probability = 0.0;  // p(o|c).
-  pose::PoseSpread spread;   // How well the matches hold the pose.
+  double probability = 0.0;        // p(o|c).
+  pose::PoseSpread spread;         // How well matches, surface and texture hold the pose.
+  std::optional<double> likeness;  // Of the object there to its learned views; see pose::DenseFit.
 };
 
 // Where the object can be in a frame that was not looked at yet.
@@ -55,7 +56,7 @@ class Tracker {
                       const recognition::GuidedPose& guided) const;
   geometry::Rigid Refined(const rgbd::Frame& frame, const Evidence& evidence, const geometry::Rigid& T_camera_object,
                           const std::optional<geometry::Rigid>& mount_pose) const;
-  pose::PoseSpread SpreadAt(const rgbd::Frame& frame, const Evidence& evidence, const geometry::Rigid& T_camera_object) const;
+  void Weigh(const rgbd::Frame& frame, const Evidence& evidence, Track* track) const;  // Its spread and likeness.
 
   LearnerParams params_;
 };

@@ -101,6 +101,35 @@ void AddTexture(const std::vector<TextureResidual>& residuals, double min_sigma,
   }
 }
 
+// Pearson's correlation; nullopt where there is little to compare.
+std::optional<double> Correlation(const std::vector<TextureResidual>& residuals) {
+  constexpr std::size_t kEnough = 30;
+  if (residuals.size() < kEnough) return std::nullopt;
+  double mean_expected = 0.0, mean_seen = 0.0;
+  for (const TextureResidual& residual : residuals) {
+    mean_expected += residual.expected / residuals.size();
+    mean_seen += residual.seen / residuals.size();
+  }
+  double both = 0.0, expected = 0.0, seen = 0.0;
+  for (const TextureResidual& residual : residuals) {
+    const double e = residual.expected - mean_expected, s = residual.seen - mean_seen;
+    both += e * s;
+    expected += e * e;
+    seen += s * s;
+  }
+  return both / std::sqrt(std::max(1.0, expected * seen));
+}
+
+std::optional<double> LikenessOf(const Appearance& appearance, const rgbd::Frame& frame, const SmoothImage* image,
+                                 const geometry::Rigid& T) {
+  std::optional<double> likeness;
+  if (!image) return likeness;
+  for (const std::vector<TexturePoint>& texture : appearance.textures) {
+    likeness = std::max(likeness, Correlation(ResidualsOf(texture, frame, *image, T)));  // Nothing is less than anything.
+  }
+  return likeness;
+}
+
 NormalEquations TextureEquations(const Appearance& appearance, const rgbd::Frame& frame, const SmoothImage* image,
                                  const geometry::Rigid& T, const DenseParams& params) {
   NormalEquations equations;
@@ -187,6 +216,7 @@ DenseFit FitDensely(const Appearance& appearance, const rgbd::Frame& frame, cons
     for (const SurfacePoint& sample : appearance.surface) AddSurface(sample, frame, fit.T_camera_object, &equations);
     fit.samples = equations.samples - fit.texture_samples;
     fit.information = equations.hessian;
+    if (iteration == iterations) fit.likeness = LikenessOf(appearance, frame, image, fit.T_camera_object);
     if (iteration == iterations || equations.samples < 6) return fit;
     // Directions in which the object slides are held by a weight that is little beside any that it does not slide in.
     const double held = 1e-4 * equations.hessian.topLeftCorner<3, 3>().trace();

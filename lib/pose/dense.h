@@ -71,6 +71,8 @@ struct DenseFit {
   Eigen::Matrix<double, 6, 6> information;  // Of the step (translation, rotation vector) in camera coordinates; may be singular.
   int samples = 0;                          // Of the surface that were measured near enough.
   int texture_samples = 0;
+  std::optional<double> likeness;  // Correlation of the brightness that was expected with what is seen, of the view that looks most
+                                   // alike; nullopt where none shows enough texture.
 };
 
 // The pose that draws surface and texture to the frame (as above, but nothing else speaks). Where the object could slide along

@@ -80,6 +80,7 @@ class Run {
     if (learned.view_added) {
       LearnedView(frame);
     } else {
+      if (learned.refined && store_) store_->Update(*learner_.object());
       ++result_.failed_attempts;
     }
     Tell(learned.view_added ? "view added" : learned.note, &decision);
@@ -152,6 +153,7 @@ class Run {
   }
 
   void Finish() {
+    if (learner_.FinishRefinement() && store_) store_->Update(*learner_.object());
     result_.object = learner_.object();
     result_.views = static_cast<int>(result_.object->views.size());
     result_.completeness = CompletenessNow();

@@ -180,6 +180,8 @@ void Fields(Visitor& visit, learning::LearnerParams& params) {
   visit("min_view_angle_deg", params.min_view_angle_deg);
   visit("max_spread_m", params.max_spread_m);
   visit("max_spread_deg", params.max_spread_deg);
+  visit("min_links", params.min_links);
+  visit("min_likeness", params.min_likeness);
   visit("neighbour_views", params.neighbour_views);
   visit("roi_margin", params.roi_margin);
   visit("min_roi_margin_px", params.min_roi_margin_px);

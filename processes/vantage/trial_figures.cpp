@@ -85,7 +85,7 @@ std::string FrameTable(const LearnerTrial& trial) {
   std::ostringstream table;
   table.precision(6);
   table << "frame,time_s,circle,faulty,usable,state,tracked,wrong,error_mm,error_deg,confidence,probability,inliers,spread_mm,"
-           "spread_deg,reference_view,"
+           "spread_deg,likeness,reference_view,"
            "view_added,views,points,ms,cpu_ms,memory_mb,note\n";
   for (const TrialStep& step : trial.steps()) {
     const learning::LearnerResult& result = step.result;
@@ -96,9 +96,9 @@ std::string FrameTable(const LearnerTrial& trial) {
     else
       table << "NaN,NaN";
     table << ',' << result.confidence.value << ',' << result.probability << ',' << result.inliers << ','
-          << 1e3 * result.spread.sigma_m << ',' << result.spread.sigma_rad * 180.0 / M_PI << ',' << result.reference_view << ','
-          << result.view_added << ',' << step.views << ',' << step.points << ',' << step.ms << ',' << step.cpu_ms << ','
-          << step.memory_mb << ',' << Quoted(result.note) << '\n';
+          << 1e3 * result.spread.sigma_m << ',' << result.spread.sigma_rad * 180.0 / M_PI << ',' << result.likeness.value_or(NAN)
+          << ',' << result.reference_view << ',' << result.view_added << ',' << step.views << ',' << step.points << ',' << step.ms
+          << ',' << step.cpu_ms << ',' << step.memory_mb << ',' << Quoted(result.note) << '\n';
   }
   return table.str();
 }
