@@ -31,6 +31,22 @@ cv::Mat Widened(const std::vector<cv::Point>& hull, int margin, const geometry::
   return mask;
 }
 
+// With at most `count` samples of texture, evenly chosen.
+pose::Appearance WithTextureOf(const pose::Appearance& appearance, int count) {
+  std::size_t samples = 0;
+  for (const auto& texture : appearance.textures) samples += texture.size();
+  const double step = std::max(1.0, static_cast<double>(samples) / count);
+  pose::Appearance thinned;
+  thinned.surface = appearance.surface;
+  for (const auto& texture : appearance.textures) {
+    thinned.textures.emplace_back();
+    for (double at = 0.0; at < static_cast<double>(texture.size()); at += step) {
+      thinned.textures.back().push_back(texture[static_cast<std::size_t>(at)]);
+    }
+  }
+  return thinned;
+}
+
 }  // namespace
 
 // All that a frame says about the pose of an object that was found in it.
@@ -93,8 +109,10 @@ geometry::Rigid Tracker::Refined(const rgbd::Frame& frame, const Evidence& evide
 
 void Tracker::Weigh(const rgbd::Frame& frame, const Evidence& evidence, Track* track) const {
   constexpr double kPixelSigma = 1.0;
+  constexpr int kIndependentTexture = 200;  // Brightness errs together among neighbours: more samples do not hold a pose better.
+  const pose::Appearance independent = WithTextureOf(evidence.appearance, kIndependentTexture);
   const pose::DenseFit dense =
-      pose::FitDensely(evidence.appearance, frame, evidence.smooth(), track->T_camera_object, params_.refinement.dense, 0);
+      pose::FitDensely(independent, frame, evidence.smooth(), track->T_camera_object, params_.refinement.dense, 0);
   track->likeness = dense.likeness;
   track->spread =
       pose::SpreadOfPose(evidence.matches, evidence.all, frame.camera, track->T_camera_object, kPixelSigma, dense.information);
