@@ -23,7 +23,8 @@ struct LearnerOptions {
   std::vector<std::string> meshes;
   std::string swapped_for;
   std::string fault = "none";
-  int frames = 0;  // 0 = all of the orbit.
+  int frames = 0;   // 0 = all of the orbit.
+  int circles = 0;  // 0 = one at each elevation.
   bool quick = false;
   std::optional<double> start_azimuth_deg;  // None = before the broadest side.
   bool tell_poses = false;
@@ -67,6 +68,11 @@ simulation::SequenceParams SequenceOf(const LearnerOptions& options, const simul
   params.tell_camera_pose = options.tell_poses;
   params.orbit.start_azimuth_deg = options.start_azimuth_deg.value_or(BroadestSide_deg(world.Truth().at(0)));
   params.fault.fault = simulation::FaultFromString(options.fault);
+  if (options.circles > 0) {
+    const std::vector<double> elevations_deg = params.orbit.elevations_deg;
+    params.orbit.elevations_deg.clear();
+    for (int i = 0; i < options.circles; ++i) params.orbit.elevations_deg.push_back(elevations_deg[i % elevations_deg.size()]);
+  }
   if (options.quick) {
     params.orbit.elevations_deg = {35.0};
     params.rate_hz = 10.0;
@@ -258,8 +264,11 @@ void AddEvaluateLearner(CLI::App& evaluate, Run& run) {
       ->capture_default_str();
   verb->add_option("--swapped-for", options->swapped_for, "With --fault swapped and --mesh: the mesh that takes the object's place")
       ->type_name("MESH");
-  verb->add_option("--frames", options->frames, "Stop after so many frames (default: two circles)")
+  verb->add_option("--frames", options->frames, "Stop after so many frames (default: all circles)")
       ->check(CLI::Range(1, 1000000))
+      ->type_name("N");
+  verb->add_option("--circles", options->circles, "So many circles, by turns at each elevation: does time and memory stay flat?")
+      ->check(CLI::Range(1, 100))
       ->type_name("N");
   SequenceTrialOptions& sequence = options->sequence;
   CLI::Option* folder =
@@ -284,7 +293,7 @@ void AddEvaluateLearner(CLI::App& evaluate, Run& run) {
   verb->add_option("--start-azimuth", options->start_azimuth_deg,
                    "Where the camera begins, degrees about z from x (default: before the object's broadest side)")
       ->type_name("DEG");
-  verb->add_flag("--quick", options->quick, "One circle at 10 Hz instead of two at 30");
+  verb->add_flag("--quick", options->quick, "One circle at 10 Hz instead of two at 30")->excludes("--circles");
   verb->add_flag("--tell-poses", options->tell_poses, "The learner is told where the camera is");
   verb->add_option("--save", options->save, "Write frames.csv, views.csv, plot.png (where gnuplot is found) and pictures here")
       ->type_name("DIR");

@@ -76,6 +76,22 @@ Json Spread(const std::vector<double>& values) {
           {"max", Rounded(Quantile(values, 1.0))}};
 }
 
+// Whether time and memory stay flat: of every thousand frames the median time of the processor, and where memory stands at their
+// end.
+Json EveryThousand(const std::vector<TrialStep>& steps) {
+  constexpr std::size_t kFrames = 1000;
+  Json thousands = Json::array();
+  for (std::size_t end = kFrames; end <= steps.size(); end += kFrames) {
+    std::vector<double> cpu_ms;
+    for (std::size_t i = end - kFrames; i < end; ++i) cpu_ms.push_back(steps[i].cpu_ms);
+    thousands.push_back({{"frames", end},
+                         {"cpu_ms", Rounded(Quantile(cpu_ms, 0.5))},
+                         {"memory_mb", Rounded(steps[end - 1].memory_mb)},
+                         {"views", steps[end - 1].views}});
+  }
+  return thousands;
+}
+
 std::string Quoted(std::string text) {
   std::replace(text.begin(), text.end(), '"', '\'');
   return '"' + text + '"';
@@ -163,6 +179,7 @@ Json FiguresOf(const LearnerTrial& trial) {
   figures["after_fault"] = FaultFigures(steps);
   figures["ms"] = Spread(ms);
   figures["cpu_ms"] = Spread(cpu_ms);
+  figures["every_thousand"] = EveryThousand(steps);
   figures["memory_mb"] = {{"first", Rounded(steps.empty() ? NAN : steps.front().memory_mb)},
                           {"last", Rounded(steps.empty() ? NAN : steps.back().memory_mb)}};
   return figures;
@@ -218,6 +235,10 @@ std::string SummaryOf(const Json& figures) {
   text << figures["ms"]["median"] << " ms a frame (p95 " << figures["ms"]["p95"] << "), of the processor "
        << figures["cpu_ms"]["median"] << " (p95 " << figures["cpu_ms"]["p95"] << "); memory " << figures["memory_mb"]["first"]
        << " -> " << figures["memory_mb"]["last"] << " MB\n";
+  for (const Json& part : figures.value("every_thousand", Json::array())) {
+    text << "  after " << part["frames"] << " frames: " << part["cpu_ms"] << " ms of the processor (median of the last thousand), "
+         << part["memory_mb"] << " MB, " << part["views"] << " views\n";
+  }
   return text.str();
 }
 
