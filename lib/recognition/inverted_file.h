@@ -93,6 +93,12 @@ class InvertedFile {
     std::int32_t object = -1;
     std::int32_t view = -1;
   };
+  // A leaf of a query.
+  struct Term {
+    const Leaf* leaf;
+    double weight;
+    double value;
+  };
   // Sums over a view's leaves with term frequency m and l = ln N_i, from which its norm follows for any N: w = ln(N + B) - l.
   struct Slot {
     std::vector<std::int32_t> leaves;  // Of every keypoint.
@@ -104,14 +110,22 @@ class InvertedFile {
 
   double LogDocuments() const;
   double NormOf(const Slot& slot, double log_documents) const;
+  std::vector<Term> TermsOf(const Words& words, int paths) const;
+  // visit(slot, term frequency) for every view in the leaf.
   template <typename Visitor>
-  static void ForEachRun(const Leaf& leaf, const Visitor& visit);
+  static void ForEachRun(const Leaf& leaf, const Visitor& visit) {
+    const std::size_t size = leaf.points.size();
+    for (std::size_t start = 0, end = 0; start < size; start = end) {
+      while (end < size && leaf.points[end].slot == leaf.points[start].slot) ++end;
+      visit(leaf.points[start].slot, static_cast<int>(end - start));
+    }
+  }
   void Contribute(const Leaf& leaf, double sign);
   void Insert(int leaf, int slot, const int* keypoints, int count, const cv::Mat& descriptors);
   static void FetchEnds(const Leaf& leaf);
   void UpdateWeight(Leaf& leaf);
   void SplitLeaf(int leaf);
-  cv::Mat Decode(const Leaf& leaf, int first, int step, int count) const;
+  cv::Mat DescriptorsOf(const Leaf& leaf, int first, int step, int count) const;
   int SplitCost(const Leaf& leaf) const;
   void CountHolder(Leaf& leaf, int object, int points);
   void RemoveSlot(int slot);

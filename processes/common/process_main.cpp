@@ -3,11 +3,13 @@
 #include <cstdio>
 #include <exception>
 
+#include "features/memory.h"
 #include "messaging/run_loop.h"
 
 namespace vantage::processes {
 
 int RunProcess(int argc, char** argv, const ProcessDescription& process) {
+  features::KeepFreedMemory();
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // Logs are read while we run.
   CLI::App app(process.purpose, process.name);
   std::string url;

@@ -4,6 +4,7 @@
 #include <exception>
 #include <string>
 
+#include "features/memory.h"
 #include "vantage/verb.h"
 
 namespace {
@@ -40,6 +41,7 @@ std::string UnknownVerb(const CLI::App& app, int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  vantage::features::KeepFreedMemory();
   CLI::App app("Learns objects from RGB-D recordings, recognises them, and knows how sure it is.", "vantage");
   app.set_version_flag("--version", "vantage " VANTAGE_VERSION);
   app.require_subcommand(1);

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "features/features.h"
+#include "features/memory.h"
 #include "textured_objects.h"
 
 namespace {
@@ -26,6 +27,7 @@ void Extract(benchmark::State& state) {
   cv::resize(gray, gray, cv::Size(640, 480), 0.0, 0.0, cv::INTER_AREA);
   features::FeatureParams params;
   if (state.range(0) == 1) params.type = "surf";
+  features::KeepFreedMemory();  // As the programs do.
   const int threads = cv::getNumThreads();
   cv::setNumThreads(static_cast<int>(state.range(1)));
   double caller_s = 0.0;

@@ -11,6 +11,7 @@
 #include <map>
 #include <opencv2/core/utility.hpp>
 
+#include "features/memory.h"
 #include "recognition/recogniser.h"
 #include "textured_objects.h"
 
@@ -93,6 +94,7 @@ Tally Judge(const std::vector<recognition::Detection>& detections, const benchma
 }
 
 void RecogniseTable(benchmark::State& state) {
+  features::KeepFreedMemory();  // As the programs do.
   const int known = static_cast<int>(state.range(0));
   recognition::RecogniserParams params;
   if (state.range(1) == 1) params.matching.exhaustive_points = 100000000;
