@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <opencv2/core/utility.hpp>
 #include <stdexcept>
 #include <string>
 
@@ -40,7 +41,15 @@ class PointCounter {
 struct Running {
   size_t cluster;
   std::unique_ptr<ClusterSearch> search;
+  int drawn = 0;
   bool done = false;
+
+  // Returns whether the best pose changed.
+  bool Draw() {
+    const bool better = search->Draw();
+    done = ++drawn >= search->IterationsNeeded();
+    return better;
+  }
 };
 
 int CountMatched(const std::vector<MatchCluster>& clusters, const std::vector<Running>& searches) {
@@ -78,23 +87,34 @@ MultiPose EstimatePoses(const std::vector<MatchCluster>& clusters, const geometr
     searches.push_back({i, std::make_unique<ClusterSearch>(clusters[i], camera, depth, params, seed)});
   }
   result.matched = CountMatched(clusters, searches);
-  int needed = searches.empty() ? 0 : params.max_iterations;
-  for (int k = 1; k <= needed; ++k) {
-    bool better = false, all_done = true;
-    for (Running& running : searches) {
-      if (running.done) continue;
-      better |= running.search->Draw();
-      running.done = k >= running.search->IterationsNeeded();
-      all_done &= running.done;
+  // No joint end before the last of these.
+  const int alone = std::min(params.min_joint_iterations, params.max_iterations);
+  cv::parallel_for_(cv::Range(0, static_cast<int>(searches.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      while (!searches[i].done && searches[i].drawn < alone) searches[i].Draw();
     }
+  });
+  bool better = true;
+  int needed = 0;
+  for (int k = alone; !searches.empty(); ++k) {
     if (better) {
       result.explained = CountExplained(clusters, searches);
       needed = IterationsNeeded(double(result.explained) / result.matched, params);
     }
-    result.iterations = k;
+    if (k >= needed) break;
+    bool all_done = true;
+    better = false;
+    for (Running& running : searches) {
+      if (running.done) continue;
+      better |= running.Draw();
+      all_done = false;
+    }
     if (all_done) break;
   }
-  for (const Running& running : searches) result.poses[running.cluster] = running.search->Finish();
+  for (const Running& running : searches) {
+    result.iterations = std::max(result.iterations, running.drawn);
+    result.poses[running.cluster] = running.search->Finish();
+  }
   result.explained = CountExplained(clusters, searches);
   return result;
 }

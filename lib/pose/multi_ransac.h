@@ -27,7 +27,8 @@ struct MultiPose {
 // Every iteration draws one P3P hypothesis for each cluster that still runs; a cluster keeps the better (MSAC; Torr and Zisserman,
 // 2000), a new best is locally optimised (Chum, Matas and Kittler, 2003). All end when
 //     eta = (1 - eps^n)^k <= eta_0,    n = 3, eps = explained / matched over the whole image,              (8)
-// and a cluster alone when the same holds for its own eps, taken to be at least the share it needs to be accepted. Clusters that
+// but not before params.min_joint_iterations, and a cluster alone when the same holds for its own eps, taken to be at least the
+// share it needs to be accepted. Until the joint end may come each cluster is on its own, and all cores are used. Clusters that
 // can never reach min_inliers are not drawn for. What a cluster draws depends on the seed and on its matches alone, so that the
 // order of the clusters does not matter. `depth` may be null: no depth check.
 //

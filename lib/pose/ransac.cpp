@@ -14,6 +14,7 @@ void RansacParams::Check() const {
   require(inlier_px > 0.0, "inlier_px must be > 0");
   require(failure_rate > 0.0 && failure_rate < 1.0, "failure_rate must be in (0, 1)");
   require(min_iterations >= 1, "min_iterations must be >= 1");
+  require(min_joint_iterations >= 1, "min_joint_iterations must be >= 1");
   require(max_iterations >= min_iterations, "max_iterations must be >= min_iterations");
   require(max_depth_error_m > 0.0, "max_depth_error_m must be > 0");
   require(min_depth_support >= 0.0 && min_depth_support <= 1.0, "min_depth_support must be in [0, 1]");

@@ -15,7 +15,8 @@ namespace vantage::pose {
 struct RansacParams {
   double inlier_px = 3.0;           // Reprojection error of an inlier; > 0.
   double failure_rate = 0.001;      // eta_0 of equation (8): stop when a correct pose was missed with less than this; (0, 1).
-  int min_iterations = 100;         // Also where most of the image is explained: hidden objects need them; >= 1.
+  int min_iterations = 100;         // Of a cluster, however much of it is explained; >= 1.
+  int min_joint_iterations = 500;   // Of clusters not yet explained, however much of the image is: hidden objects need them; >= 1.
   int max_iterations = 10000;       // Of any cluster; 6905 find 10 % of inliers; >= min_iterations.
   double max_depth_error_m = 0.03;  // |dz| between an inlier's point and the depth image that still supports a pose; > 0.
   double min_depth_support = 0.5;   // Share of the sampled and inlying points with depth that must be supported; [0, 1].

@@ -11,7 +11,7 @@
 namespace vantage::recognition {
 namespace {
 
-constexpr double kWeightStep = 0.02;     // ln N_i that is out by less is not worth a walk over the leaf.
+constexpr double kWeightStep = 0.05;     // ln N_i that is out by less is not worth a walk over the leaf.
 constexpr std::size_t kLeavesAhead = 6;  // Whose ends are fetched from memory while a view's points go into earlier ones.
 constexpr int kUrgent = 4;  // A leaf that came to hold so many times too many is split before others, or it would take long.
 

@@ -29,6 +29,7 @@ void Fields(Visitor& visit, pose::RansacParams& params) {
   visit("inlier_px", params.inlier_px);
   visit("failure_rate", params.failure_rate);
   visit("min_iterations", params.min_iterations);
+  visit("min_joint_iterations", params.min_joint_iterations);
   visit("max_iterations", params.max_iterations);
   visit("max_depth_error_m", params.max_depth_error_m);
   visit("min_depth_support", params.min_depth_support);

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <map>
 #include <numeric>
-#include <random>
+#include <utility>
 
 #include "features/features.h"
 #include "recognition/inverted_file.h"
@@ -29,14 +29,27 @@ constexpr int kViewsPerObject = 10;
 // Processor time, seconds: others use the machine too.
 double Now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-float Uniform(std::mt19937& random) { return static_cast<float>(random() / 4294967296.0); }
+// PCG (O'Neill, 2014), of 32 bits: half of a filling would else go to making numbers.
+class Random {
+ public:
+  explicit Random(std::uint32_t seed) : state_(0x9e3779b97f4a7c15u * (seed + 1u)) {}
+  std::uint32_t operator()() {
+    const std::uint64_t state = std::exchange(state_, state_ * 6364136223846793005u + 1442695040888963407u);
+    return static_cast<std::uint32_t>((state ^ (state >> 22)) >> (22 + (state >> 61)));
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+float Uniform(Random& random) { return static_cast<float>(random()) * 0x1p-32f; }
 
 // Of variance 1, near enough to normal.
-float Bell(std::mt19937& random) { return (Uniform(random) + Uniform(random) + Uniform(random) - 1.5f) * 2.f; }
+float Bell(Random& random) { return (Uniform(random) + Uniform(random) + Uniform(random) - 1.5f) * 2.f; }
 
 const cv::Mat& Basis() {
   static const cv::Mat basis = [] {
-    std::mt19937 random(1);
+    Random random(1);
     cv::Mat matrix(kDegrees, kLength, CV_32F);
     for (int i = 0; i < kDegrees * kLength; ++i) matrix.ptr<float>()[i] = Bell(random);
     return matrix;
@@ -51,7 +64,7 @@ void Normalise(float* row) {
 }
 
 cv::Mat Descriptors(int rows, std::uint32_t seed) {
-  std::mt19937 random(seed);
+  Random random(seed);
   cv::Mat latent(rows, kDegrees, CV_32F);
   for (int i = 0; i < rows * kDegrees; ++i) latent.ptr<float>()[i] = Bell(random);
   cv::Mat descriptors = latent * Basis();
@@ -63,7 +76,7 @@ cv::Mat ObjectPoints(int object) { return Descriptors(kObjectPoints, 1000 + stat
 
 // The object from one side: half of its points, each descriptor off by about `noise`.
 cv::Mat ViewOf(const cv::Mat& points, double view, float noise, std::uint32_t seed) {
-  std::mt19937 random(seed);
+  Random random(seed);
   cv::Mat rows(kViewPoints, kLength, CV_32F);
   const int first = static_cast<int>(view / kViewsPerObject * kObjectPoints);
   for (int r = 0; r < kViewPoints; ++r) {
@@ -170,7 +183,8 @@ BENCHMARK(Query)
     ->Unit(benchmark::kMillisecond);
 
 // The longest pause that adding a view makes. Filling is the same every time, so what a view took in the fastest of a few fillings
-// is its own: on a shared machine even a loop of 3 ms that does nothing else is seen to take 70 now and then.
+// is its own: on a shared machine even a loop of 3 ms that does nothing else is seen to take 70 now and then. One of 100 000 views
+// takes minutes and is done once: its longest is at most what is told.
 void LongestAddition(benchmark::State& state) {
   FilledFile(1, 0);  // Lets go of what other benchmarks kept.
   const int objects = static_cast<int>(state.range(0)) / kViewsPerObject;
@@ -187,10 +201,11 @@ void LongestAddition(benchmark::State& state) {
 }
 BENCHMARK(LongestAddition)
     ->ArgNames({"views", "leaf_points"})
+    ->Args({1000, 0})
     ->Args({1000, 50})
-    ->Args({100000, 200})
     ->Iterations(3)
     ->Unit(benchmark::kSecond);
+BENCHMARK(LongestAddition)->ArgNames({"views", "leaf_points"})->Args({100000, 200})->Iterations(1)->Unit(benchmark::kSecond);
 
 // The same question by brute force: every query point votes for the object of the stored point nearest to it.
 void BruteForce(benchmark::State& state) {

@@ -44,7 +44,7 @@ TEST(MultiRansac, FindsEveryObjectAndNothingAmongOutliers) {
 TEST(MultiRansac, EndsWhenTheImageIsExplained) {
   const Table table = MakeTable(2, 6, 50, 0.6);
   RansacParams params;
-  params.min_iterations = 1;
+  params.min_iterations = params.min_joint_iterations = 1;
   const MultiPose found = EstimatePoses(table.clusters, kCamera, nullptr, params, 0);
   const double share = double(found.explained) / found.matched;
   const double needed = std::log(params.failure_rate) / std::log(1.0 - share * share * share);
@@ -62,6 +62,19 @@ TEST(MultiRansac, AClusterThatIsExplainedStopsAndOthersGoOn) {
   EXPECT_LT(ErrorOf(found.poses[1], hard), 0.02);
   EXPECT_EQ(found.poses[0]->iterations, RansacParams{}.min_iterations);
   EXPECT_GT(found.poses[1]->iterations, 300);
+}
+
+// A hidden object's cluster holds few right matches: without patience it is given up once the others are explained.
+TEST(MultiRansac, AHiddenObjectIsFoundAmongOthersThatAreClear) {
+  Truth truth(9);
+  std::vector<MatchCluster> clusters;
+  for (int i = 0; i < 10; ++i) clusters.push_back({truth.Matches(truth.Pose(), 80, 0.95, 0.5), {}, 7});
+  const geometry::Rigid hidden = truth.Pose();
+  clusters.push_back({truth.Matches(hidden, 100, 0.25, 0.5), {}, 7});
+  RansacParams params;
+  EXPECT_LT(ErrorOf(EstimatePoses(clusters, kCamera, nullptr, params, 0).poses[10], hidden), 0.02);
+  params.min_iterations = params.min_joint_iterations = 1;
+  EXPECT_FALSE(EstimatePoses(clusters, kCamera, nullptr, params, 0).poses[10].has_value());
 }
 
 TEST(MultiRansac, ClustersThatCanNeverBeAcceptedCostNothing) {
