@@ -15,7 +15,7 @@ struct FeaturesOptions {
   int object_id = 0;
   std::string frames = "even";
   int folds = 2;
-  std::vector<std::string> settings = {"sift:2000:0.02", "sift:3000:0.02", "sift:3000:0.04",
+  std::vector<std::string> settings = {"sift:2000:0.02", "sift:2000:0.04", "sift:3000:0.02", "sift:3000:0.04",
                                        "surf:3000:0.02", "surf:3000:0.01", "surf:6000:0.005"};
   bool quick = false;
 };
