@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <stdexcept>
 
 namespace vantage::measures {
@@ -40,6 +41,27 @@ double CalibrationError(const std::vector<Forecast>& forecasts, int bins) {
     error += bin.count * std::abs(bin.mean_probability - bin.frequency) / static_cast<double>(forecasts.size());
   }
   return error;
+}
+
+Interval BootstrapInterval(const std::vector<std::vector<Forecast>>& groups,
+                           const std::function<double(const std::vector<Forecast>&)>& statistic, int resamples, double level,
+                           std::uint32_t seed) {
+  if (resamples < 1) throw std::invalid_argument("BootstrapInterval: resamples must be >= 1");
+  if (!(level > 0.0 && level < 1.0)) throw std::invalid_argument("BootstrapInterval: level must be in (0, 1)");
+  if (groups.empty()) return {};
+  std::mt19937 random(seed);
+  std::vector<double> values;
+  for (int i = 0; i < resamples; ++i) {
+    std::vector<Forecast> drawn;
+    for (std::size_t k = 0; k < groups.size(); ++k) {
+      const auto& group = groups[static_cast<std::uint64_t>(random()) * groups.size() >> 32];
+      drawn.insert(drawn.end(), group.begin(), group.end());
+    }
+    values.push_back(statistic(drawn));
+  }
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double share) { return values[static_cast<std::size_t>(std::lround(share * (resamples - 1)))]; };
+  return {at(0.5 * (1.0 - level)), at(0.5 * (1.0 + level))};
 }
 
 }  // namespace vantage::measures

@@ -1,6 +1,8 @@
 // How well probabilities hold: Brier score, calibration error, reliability.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace vantage::measures {
@@ -26,5 +28,18 @@ std::vector<ReliabilityBin> Reliability(std::vector<Forecast> forecasts, int bin
 
 // Expected calibration error: mean |probability - frequency| over the reliability bins, weighted by count. 0 without forecasts.
 double CalibrationError(const std::vector<Forecast>& forecasts, int bins = 10);
+
+struct Interval {
+  double lower = 0.0;
+  double upper = 0.0;
+};
+
+// Percentile bootstrap of a statistic over groups (Efron, 1979): forecasts of one frame err together, so whole frames are drawn,
+// with replacement, as many as there are. Holds `level` of the resampled values in its middle. Deterministic in `seed`; {0, 0}
+// without groups. Throws std::invalid_argument where resamples < 1 or level is not in (0, 1). Cost: the statistic, `resamples`
+// times.
+Interval BootstrapInterval(const std::vector<std::vector<Forecast>>& groups,
+                           const std::function<double(const std::vector<Forecast>&)>& statistic, int resamples = 1000,
+                           double level = 0.95, std::uint32_t seed = 0);
 
 }  // namespace vantage::measures

@@ -58,5 +58,42 @@ TEST(Calibration, EveryForecastIsInOneBin) {
   EXPECT_THROW(Reliability({{0.5, true}}, 0), std::invalid_argument);
 }
 
+TEST(Calibration, ErrorOfThreeForecastsByHand) {
+  // Three bins of one: (|0.1 - 0| + |0.6 - 1| + |0.9 - 0|) / 3. One bin: |1.6 / 3 - 1 / 3|.
+  const std::vector<Forecast> forecasts = {{0.6, true}, {0.9, false}, {0.1, false}};
+  EXPECT_NEAR(CalibrationError(forecasts, 3), 1.4 / 3.0, 1e-12);
+  EXPECT_NEAR(CalibrationError(forecasts, 15), 1.4 / 3.0, 1e-12);  // More bins than forecasts: the empty ones are left out.
+  EXPECT_NEAR(CalibrationError(forecasts, 1), 0.2, 1e-12);
+}
+
+TEST(Bootstrap, DrawsWholeGroups) {
+  // Two frames, all wrong and all right: a resample is one of them twice or both, so the Brier score is 1, 0 or 1/2.
+  const std::vector<std::vector<Forecast>> groups = {{{1.0, false}, {1.0, false}}, {{1.0, true}, {1.0, true}}};
+  const Interval interval = BootstrapInterval(groups, BrierScore, 400, 0.95, 1);
+  EXPECT_EQ(interval.lower, 0.0);
+  EXPECT_EQ(interval.upper, 1.0);
+  const Interval middle = BootstrapInterval(groups, BrierScore, 400, 0.3, 1);
+  EXPECT_EQ(middle.lower, 0.5);
+  EXPECT_EQ(middle.upper, 0.5);
+}
+
+TEST(Bootstrap, IsAsWideAsTheSamplingErrorAndTheSameAgain) {
+  std::mt19937 random(8);
+  std::vector<std::vector<Forecast>> groups;
+  for (int i = 0; i < 400; ++i) groups.push_back({{0.0, random() % 4 == 0}});
+  const Interval interval = BootstrapInterval(groups, BrierScore, 1000, 0.95, 5);
+  // The mean of 400 draws that are true a quarter of the time: standard error 0.0217, 95 % within +-0.042.
+  EXPECT_NEAR(interval.upper - interval.lower, 0.085, 0.012);
+  EXPECT_LT(interval.lower, 0.25);
+  EXPECT_GT(interval.upper, 0.25);
+  EXPECT_EQ(BootstrapInterval(groups, BrierScore, 1000, 0.95, 5).lower, interval.lower);
+}
+
+TEST(Bootstrap, RefusesWhatMakesNoSense) {
+  EXPECT_EQ(BootstrapInterval({}, BrierScore).upper, 0.0);
+  EXPECT_THROW(BootstrapInterval({}, BrierScore, 0), std::invalid_argument);
+  EXPECT_THROW(BootstrapInterval({}, BrierScore, 10, 1.0), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace vantage::measures
