@@ -60,8 +60,11 @@ int ClusterOfObject(const std::vector<segmentation::Cluster>& clusters, const mo
 std::optional<model::ObjectModel> WithView(const model::ObjectModel& object, const rgbd::Frame& frame, const cv::Mat& mask,
                                            const features::Features& features, const geometry::Rigid& T_camera_object,
                                            const std::vector<recognition::GuidedMatch>& links, int min_points) {
-  cv::Mat_<float> inset;  // Pixels from the silhouette.
-  cv::distanceTransform(mask, inset, cv::DIST_L2, cv::DIST_MASK_5);
+  cv::Mat bordered;
+  cv::copyMakeBorder(mask, bordered, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(0));  // The image's end is an outline too.
+  cv::Mat_<float> inset;                                                               // Pixels from the silhouette.
+  cv::distanceTransform(bordered, inset, cv::DIST_L2, cv::DIST_MASK_5);
+  inset = inset(cv::Rect({1, 1}, mask.size()));
   std::map<int, int> linked_point;
   for (const recognition::GuidedMatch& link : links) linked_point[link.keypoint] = link.point;
 
@@ -123,7 +126,6 @@ std::vector<pose::SurfacePoint> SurfaceOfView(const model::View& view, int count
 std::vector<pose::TexturePoint> TextureOfView(const model::View& view, int count) {
   constexpr double kCandidates = 8.0;   // Pixels that are looked at for each point wanted.
   constexpr double kMinGradient = 4.0;  // Grey levels per pixel of the smoothed image.
-  constexpr double kMinCosine = 0.6;    // Between normal and ray: what is seen slantwise is smeared.
   constexpr int kInset = 4;             // Nearer to the silhouette its smoothed image has some of the background.
   std::vector<pose::TexturePoint> texture;
   if (view.keyframe.depth.empty() || count <= 0) return texture;
@@ -146,21 +148,39 @@ std::vector<pose::TexturePoint> TextureOfView(const model::View& view, int count
     const auto& [pixel, brightness] = edges[static_cast<std::size_t>(at)];
     const auto point = rgbd::PointAt(view.keyframe, pixel, 1);
     const auto normal = rgbd::NormalAt(view.keyframe, pixel);
-    if (point && normal && -normal->dot(point->normalized()) >= kMinCosine)
+    if (point && normal && -normal->dot(point->normalized()) >= pose::kMinTextureCosine)
       texture.push_back({T_object_camera * *point, T_object_camera.linear() * *normal, brightness});
   }
   return texture;
 }
 
-pose::Appearance AppearanceNear(const model::ObjectModel& object, const geometry::Rigid& T_camera_object, int views,
-                                int surface_samples, int texture_samples) {
+const pose::Appearance& AppearanceCache::Of(const model::View& view, int count) {
+  const auto [entry, is_new] = known_.try_emplace({view.id, view.utime, count});
+  if (is_new) {
+    model::View in_camera = view;
+    in_camera.T_camera_object = geometry::Rigid::Identity();
+    entry->second.surface = SurfaceOfView(in_camera, surface_samples_ / count);
+    entry->second.textures.push_back(TextureOfView(in_camera, texture_samples_ / count));
+  }
+  return entry->second;
+}
+
+pose::Appearance AppearanceCache::Near(const model::ObjectModel& object, const geometry::Rigid& T_camera_object) {
   pose::Appearance appearance;
-  const std::vector<int> nearest = model::NearestViews(object, T_camera_object, views);
-  const int count = std::max<int>(1, nearest.size());
-  for (const int view : nearest) {
-    const auto part = SurfaceOfView(object.views[view], surface_samples / count);
-    appearance.surface.insert(appearance.surface.end(), part.begin(), part.end());
-    appearance.textures.push_back(TextureOfView(object.views[view], texture_samples / count));
+  if (known_.size() > 2 * object.views.size() + 8) known_.clear();  // Most are of views that are gone.
+  const std::vector<int> nearest = model::NearestViews(object, T_camera_object, views_);
+  for (const int index : nearest) {
+    const model::View& view = object.views[index];
+    const geometry::Rigid T_object_camera = view.T_camera_object.inverse();
+    const pose::Appearance& in_camera = Of(view, static_cast<int>(nearest.size()));
+    for (const pose::SurfacePoint& sample : in_camera.surface) {
+      appearance.surface.push_back({T_object_camera * sample.point, T_object_camera.linear() * sample.normal});
+    }
+    appearance.textures.push_back(in_camera.textures.front());
+    for (pose::TexturePoint& sample : appearance.textures.back()) {
+      sample.point = T_object_camera * sample.point;
+      sample.normal = T_object_camera.linear() * sample.normal;
+    }
   }
   return appearance;
 }

@@ -1,7 +1,10 @@
 // Turns a frame with a known object pose into a new view of the model.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include "model/object_model.h"
@@ -33,8 +36,25 @@ std::vector<pose::SurfacePoint> SurfaceOfView(const model::View& view, int count
 // Fewer where the object is plain; empty where the view has no depth.
 std::vector<pose::TexturePoint> TextureOfView(const model::View& view, int count);
 
-// Both, of the views nearest to a pose.
-pose::Appearance AppearanceNear(const model::ObjectModel& object, const geometry::Rigid& T_camera_object, int views,
-                                int surface_samples, int texture_samples);
+// Both, of the views nearest to a pose, kept for the next time: what a view shows does not change in its camera's coordinates.
+// Memory: about 50 bytes a sample and view. Not for several threads at once.
+class AppearanceCache {
+ public:
+  // So many views are joined, and so many samples of all of them together.
+  AppearanceCache(int views, int surface_samples, int texture_samples)
+      : views_(views), surface_samples_(surface_samples), texture_samples_(texture_samples) {}
+
+  // Object frame, views by rising angle to the pose.
+  pose::Appearance Near(const model::ObjectModel& object, const geometry::Rigid& T_camera_object);
+
+ private:
+  const pose::Appearance& Of(const model::View& view, int count);
+
+  int views_;
+  int surface_samples_;
+  int texture_samples_;
+  std::map<std::tuple<int, std::int64_t, int>, pose::Appearance>
+      known_;  // By the view's id and time and `count`; camera coordinates.
+};
 
 }  // namespace vantage::learning

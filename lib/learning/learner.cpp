@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "learning/keyframe.h"
+#include "learning/model_edit.h"
 #include "learning/refiner.h"
 #include "learning/tracker.h"
 
@@ -35,7 +36,8 @@ LearnerParams WithoutDepthWhereNotWanted(LearnerParams params) {
 // A found pose and how it was found.
 struct Found {
   Track track;
-  bool followed = false;  // Where the last frames or the mount led; else by recognition.
+  bool followed = false;   // Where the last frames or the mount led; else by recognition.
+  bool continued = false;  // Where the last frames led, and its surface is there.
 };
 
 }  // namespace
@@ -182,6 +184,7 @@ struct Learner::Impl {
     const double distance = std::max(0.05, expectation.T_camera_object.translation().norm());
     const double size_px = frame.camera.fx * Size() / distance;
     const bool steady = !mount_pose && history->before && Seconds(history->utime, frame.utime) <= kMaxGap_s;
+    expectation.steady = steady;
     expectation.margin_px =
         steady ? std::max(params.min_roi_margin_px, 3.0 * history->error_px) : params.roi_margin * size_px + 20.0;
     return expectation;
@@ -213,15 +216,22 @@ struct Learner::Impl {
     return params.require_mount_agreement && expected && !tracker.Agree(T_camera_object, *expected);
   }
 
-  // A pose that was found without the mount, or without the last frames, and agrees with them is right far more often than one that
-  // is merely as confident.
-  void CreditAgreement(const std::optional<geometry::Rigid>& expected, std::optional<Track>* track) const {
-    if (!*track || !expected || !tracker.Agree((*track)->T_camera_object, *expected)) return;
-    (*track)->probability = object->measures.observed.Probability((*track)->confidence.value, params.agreement_prior);
+  // Whether a pose is where the last frames lead, and the surface is measured there: the object has been followed to it, whatever
+  // interest points say.
+  bool Continues(const rgbd::Frame& frame, const Expectation& expectation, const Track& track) const {
+    return expectation.steady && track.surface_agreement.value_or(0.0) >= params.min_surface_agreement &&
+           IsNear(frame, expectation, track.T_camera_object);
   }
 
-  bool IsGood(const rgbd::Frame& frame, const std::optional<Track>& track) const {
-    return track && track->probability >= kSeen && !ContradictsMount(frame, track->T_camera_object);
+  // A pose that was found without the mount, or without the last frames, and agrees with them is right far more often than one that
+  // is merely as confident.
+  void CreditAgreement(const std::optional<geometry::Rigid>& expected, double prior, Track* track) const {
+    if (!expected || !tracker.Agree(track->T_camera_object, *expected)) return;
+    track->probability = object->measures.observed.Probability(track->confidence.value, prior);
+  }
+
+  bool IsGood(const rgbd::Frame& frame, const Track& track) const {
+    return track.probability >= kSeen && !ContradictsMount(frame, track.T_camera_object);
   }
 
   // The reference view and the views beside it.
@@ -233,20 +243,28 @@ struct Learner::Impl {
     return views;
   }
 
-  // Around where it is expected: the reference view first, its neighbours, then the whole model where the mount says it is.
-  std::optional<Track> Follow(const rgbd::Frame& frame, const Expectation& expectation) const {
+  // Around where it is expected: the reference view first, its neighbours, then the whole model where the mount or a steady motion
+  // says it is.
+  std::optional<Found> Follow(const rgbd::Frame& frame, const Expectation& expectation) const {
     const auto mount_pose = MountPose(frame);
     const features::Features features = tracker.ExtractAround(*object, frame, expectation);
-    if (features.size() < params.recogniser.min_inliers) return std::nullopt;
+    const auto judged = [&](Found found) {
+      found.continued = Continues(frame, expectation, found.track);
+      found.followed = IsNear(frame, expectation, found.track.T_camera_object);
+      CreditAgreement(expectation.T_camera_object, found.continued ? params.surface_prior : params.agreement_prior, &found.track);
+      return found;
+    };
     for (const int view : ViewsToTry(expectation.T_camera_object)) {
+      if (features.size() < params.recogniser.min_inliers) break;
       auto track = tracker.AgainstView(*object, view, frame, features, mount_pose);
-      CreditAgreement(expectation.T_camera_object, &track);
-      if (IsGood(frame, track)) return track;
+      if (!track) continue;
+      const Found found = judged({std::move(*track)});
+      if (IsGood(frame, found.track)) return found;
     }
-    if (!mount_pose) return std::nullopt;
-    std::optional<Track> track = tracker.At(*object, frame, features, *mount_pose, true, mount_pose);
-    if (static_cast<int>(track->matches.size()) >= params.recogniser.min_inliers && IsGood(frame, track)) return track;
-    return std::nullopt;
+    if (!mount_pose && !expectation.steady) return std::nullopt;
+    const Found found = judged({tracker.At(*object, frame, features, expectation.T_camera_object, true, mount_pose)});
+    const bool held = found.continued || static_cast<int>(found.track.matches.size()) >= params.recogniser.min_inliers;
+    return held && IsGood(frame, found.track) ? std::optional<Found>(found) : std::nullopt;
   }
 
   // By the whole model, anywhere in the image.
@@ -254,8 +272,8 @@ struct Learner::Impl {
     const features::Features features = CurrentRecogniser().Extract(frame);
     const auto detections = CurrentRecogniser().Recognise(frame, features);
     if (detections.empty()) return std::nullopt;
-    std::optional<Track> track = tracker.At(*object, frame, features, detections.front().T_camera_object, true, MountPose(frame));
-    CreditAgreement(MountPose(frame), &track);
+    Track track = tracker.At(*object, frame, features, detections.front().T_camera_object, true, MountPose(frame));
+    CreditAgreement(MountPose(frame), params.agreement_prior, &track);
     return track;
   }
 
@@ -269,12 +287,9 @@ struct Learner::Impl {
   std::optional<Found> Find(const rgbd::Frame& frame) {
     const auto expectation = Expected(frame);
     if (expectation && reference_view >= 0) {
-      if (auto track = Follow(frame, *expectation)) {
-        const bool near = IsNear(frame, *expectation, track->T_camera_object);
-        return Found{std::move(*track), near};
-      }
+      if (auto found = Follow(frame, *expectation)) return found;
     }
-    if (auto track = Relocalise(frame)) return Found{std::move(*track), false};
+    if (auto track = Relocalise(frame)) return Found{std::move(*track)};
     return std::nullopt;
   }
 
@@ -302,16 +317,14 @@ struct Learner::Impl {
     constexpr int kMinSamples = 50;
     constexpr double kBehind_m = 0.03;
     int seen = 0, behind = 0;
-    for (const int view : model::NearestViews(*object, T_camera_object, params.surface_views)) {
-      for (const pose::SurfacePoint& sample : SurfaceOfView(object->views[view], params.surface_samples / params.surface_views)) {
-        const Eigen::Vector3d point = T_camera_object * sample.point;
-        if ((T_camera_object.linear() * sample.normal).dot(point.normalized()) > -0.2) continue;
-        const auto pixel = frame.camera.Project(point);
-        const auto depth = pixel ? rgbd::DepthAt(frame, *pixel, 1) : std::nullopt;
-        if (!depth) continue;
-        ++seen;
-        behind += *depth > point.z() + kBehind_m;
-      }
+    for (const pose::SurfacePoint& sample : tracker.AppearanceAt(*object, T_camera_object).surface) {
+      const Eigen::Vector3d point = T_camera_object * sample.point;
+      if ((T_camera_object.linear() * sample.normal).dot(point.normalized()) > -0.2) continue;
+      const auto pixel = frame.camera.Project(point);
+      const auto depth = pixel ? rgbd::DepthAt(frame, *pixel, 1) : std::nullopt;
+      if (!depth) continue;
+      ++seen;
+      behind += *depth > point.z() + kBehind_m;
     }
     return seen >= kMinSamples && 2 * behind > seen;
   }
@@ -394,11 +407,14 @@ struct Learner::Impl {
 
   // --- New views ---
 
-  bool IsHeld(const rgbd::Frame& frame, const Track& track) const {
+  bool IsHeld(const rgbd::Frame& frame, const Found& found) const {
+    const Track& track = found.track;
     const auto mount_pose = MountPose(frame);
     if (mount_pose && tracker.Agree(track.T_camera_object, *mount_pose)) return true;
-    return static_cast<int>(track.matches.size()) >= params.min_links && track.spread.sigma_m <= params.max_spread_m &&
-           track.spread.sigma_rad <= params.max_spread_deg * M_PI / 180.0 && track.likeness.value_or(1.0) >= params.min_likeness;
+    const bool linked = found.continued || static_cast<int>(track.matches.size()) >= params.min_links;
+    return linked && track.spread.sigma_m <= params.max_spread_m &&
+           track.spread.sigma_rad <= (found.continued ? params.max_plain_spread_deg : params.max_spread_deg) * M_PI / 180.0 &&
+           track.likeness.value_or(1.0) >= params.min_likeness;
   }
 
   // The less of the object is recognised, the nearer to a learned view a new one may be.
@@ -413,30 +429,46 @@ struct Learner::Impl {
     });
   }
 
+  // Whether the frame shows both what was learned last and, without the model knowing that they meet, something learned long
+  // before: a view of it ties them together.
+  bool ClosesLoop(const Track& track) const {
+    constexpr double kMaxAngle_rad = 25.0 * M_PI / 180.0;
+    const int newest = static_cast<int>(object->views.size()) - 1;
+    const int seen = track.confidence.view;
+    if (seen < 0 || newest - seen <= params.loop_closure.min_views_between) return false;
+    if (static_cast<int>(track.matches.size()) < params.min_links) return false;
+    const geometry::Rigid T_object_camera = track.T_camera_object.inverse();
+    return geometry::AngleBetween(T_object_camera.translation(), object->views[newest].viewpoint().direction) < kMaxAngle_rad &&
+           SharedPoints(object->views[newest], object->views[seen]) < params.refinement.min_shared_points;
+  }
+
   // Empty where a view was added, else why not.
-  std::string AddView(const rgbd::Frame& frame, const Track& track, bool pose_is_known) {
-    if (track.confidence.value >= params.new_view_confidence) return "well known from here";
+  std::string AddView(const rgbd::Frame& frame, const Found& found, bool pose_is_known) {
+    const Track& track = found.track;
+    const bool closes_loop = !pose_is_known && ClosesLoop(track);
+    if (!closes_loop && track.confidence.value >= params.new_view_confidence) return "well known from here";
     if (!pose_is_known && track.probability < params.min_track_probability) return "not sure enough to learn";
-    if (!pose_is_known && !IsHeld(frame, track)) return "the pose is not held well enough to learn";
-    if (!pose_is_known && !IsNewDirection(track)) return "too near to a learned view";
+    if (!pose_is_known && !IsHeld(frame, found)) return "the pose is not held well enough to learn";
+    if (!pose_is_known && !closes_loop && !IsNewDirection(track)) return "too near to a learned view";
     if (!Segment(frame)) return "no table plane";
     const int cluster = ClusterOfObject(clusters, *object, track.T_camera_object, frame.camera);
     if (cluster < 0) return "no cluster where the object is";
     auto extended = WithView(*object, frame, clusters[cluster].mask, track.features, track.T_camera_object, track.matches,
-                             params.min_view_points);
+                             found.continued ? 0 : params.min_view_points);
     if (!extended) return "too few interest points with depth on the object";
     Adopt(std::move(*extended));
     return "";
   }
 
   // Follows the object through a frame whose pose was found.
-  LearnerResult Advance(const rgbd::Frame& frame, const Track& track, LearnerResult result, bool pose_is_known) {
+  LearnerResult Advance(const rgbd::Frame& frame, const Found& found, LearnerResult result, bool pose_is_known) {
+    const Track& track = found.track;
     Remember(frame, track.T_camera_object, Predicted(frame));
     if (!T_world_object && frame.T_world_camera && state == State::kTracking) {
       T_world_object = *frame.T_world_camera * track.T_camera_object;
     }
     result.T_camera_object = track.T_camera_object;
-    result.note = state == State::kTracking ? AddView(frame, track, pose_is_known) : "found again, not yet surely";
+    result.note = state == State::kTracking ? AddView(frame, found, pose_is_known) : "found again, not yet surely";
     result.view_added = result.note.empty();
     if (state == State::kTracking && !pose_is_known) CountSightings(frame, track);
     if (result.view_added) {
@@ -469,7 +501,7 @@ struct Learner::Impl {
     }
     if (!known_pose && track.probability < kSeen) return Lose(result, "the object was not found");
     state = result.state = known_pose ? State::kTracking : StateOf(frame, *found);
-    return Advance(frame, track, result, known_pose.has_value());
+    return Advance(frame, *found, result, known_pose.has_value());
   }
 };
 

@@ -20,23 +20,20 @@ constexpr double kRadians = M_PI / 180.0;
 
 // --- Which older views to try ---
 
-double SharedPoints(const model::View& a, const model::View& b) {
-  const std::set<int> points_a(a.points.begin(), a.points.end());
-  const std::set<int> points_b(b.points.begin(), b.points.end());
-  const auto shared = std::count_if(points_a.begin(), points_a.end(), [&](int point) { return points_b.count(point) > 0; });
-  return double(shared) / std::max<size_t>(1, std::min(points_a.size(), points_b.size()));
+double ShareOfPoints(const model::View& a, const model::View& b) {
+  return double(SharedPoints(a, b)) / std::max<size_t>(1, std::min(a.points.size(), b.points.size()));
 }
 
 std::vector<int> Candidates(const model::ObjectModel& object, int view, const LoopClosureParams& params) {
   const model::View& seen = object.views[view];
   const measures::Viewpoint from = seen.viewpoint();
   std::vector<std::pair<double, int>> near;
-  for (int older = 0; older < view; ++older) {
+  for (int older = 0; older < view - params.min_views_between; ++older) {
     const measures::Viewpoint other = object.views[older].viewpoint();
     const double angle = geometry::AngleBetween(from.direction, other.direction);
     if (angle >= params.max_view_angle_deg * kRadians) continue;
     if (std::abs(std::log2(from.distance_m / other.distance_m)) >= params.max_octaves) continue;
-    if (SharedPoints(seen, object.views[older]) < params.max_shared) near.emplace_back(angle, older);
+    if (ShareOfPoints(seen, object.views[older]) < params.max_shared) near.emplace_back(angle, older);
   }
   std::sort(near.begin(), near.end());
   std::vector<int> candidates;
@@ -257,6 +254,7 @@ void LoopClosureParams::Check() const {
   require(max_view_angle_deg > 0.0 && max_view_angle_deg <= 180.0, "max_view_angle_deg must be in (0, 180]");
   require(max_octaves > 0.0, "max_octaves must be > 0");
   require(max_shared > 0.0 && max_shared <= 1.0, "max_shared must be in (0, 1]");
+  require(min_views_between >= 0, "min_views_between must be >= 0");
   require(max_candidates >= 1, "max_candidates must be >= 1");
   require(max_ratio > 0.0 && max_ratio <= 1.0, "max_ratio must be in (0, 1]");
   require(min_inliers >= 6, "min_inliers must be >= 6");
@@ -295,11 +293,9 @@ std::vector<Link> FindLinks(const model::ObjectModel& object, int view_index, co
 }
 
 bool ComesBack(const model::ObjectModel& object, int view, int min_shared) {
-  const std::set<int> own(object.views[view].points.begin(), object.views[view].points.end());
-  long most_older = 0;  // Shared with any view learned before the one at hand.
+  int most_older = 0;  // Shared with any view learned before the one at hand.
   for (int older = 0; older < view; ++older) {
-    const std::vector<int>& points = object.views[older].points;
-    const long shared = std::count_if(points.begin(), points.end(), [&](int point) { return own.count(point) > 0; });
+    const int shared = SharedPoints(object.views[view], object.views[older]);
     if (most_older >= min_shared && 2 * shared < most_older) return true;
     most_older = std::max(most_older, shared);
   }

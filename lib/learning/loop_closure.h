@@ -16,6 +16,7 @@ struct LoopClosureParams {
   double max_view_angle_deg = 40.0;  // Older views whose direction differs by less are tried (drift included); (0, 180].
   double max_octaves = 1.0;          // ...and whose distance differs by less; > 0.
   double max_shared = 0.15;          // ...and that share less than this share of points with the view (of the fewer); (0, 1].
+  int min_views_between = 3;         // ...learned since: those just before were tracked, linked or not; >= 0.
   int max_candidates = 3;            // The nearest so many: bounds the time; >= 1.
   double max_ratio = 0.85;           // Best over second-best descriptor distance, both ways; (0, 1].
   pose::RansacParams ransac;         // Of the pose against the old view alone, whatever the model says it is.

@@ -1,6 +1,7 @@
 #include "learning/model_edit.h"
 
 #include <algorithm>
+#include <set>
 
 namespace vantage::learning {
 
@@ -39,6 +40,11 @@ int IndexOfView(const model::ObjectModel& object, int id) {
   const auto found = std::lower_bound(object.views.begin(), object.views.end(), id,
                                       [](const model::View& view, int wanted) { return view.id < wanted; });
   return found != object.views.end() && found->id == id ? static_cast<int>(found - object.views.begin()) : -1;
+}
+
+int SharedPoints(const model::View& a, const model::View& b) {
+  const std::set<int> points_a(a.points.begin(), a.points.end()), points_b(b.points.begin(), b.points.end());
+  return static_cast<int>(std::count_if(points_a.begin(), points_a.end(), [&](int point) { return points_b.count(point) > 0; }));
 }
 
 }  // namespace vantage::learning

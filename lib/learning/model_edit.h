@@ -19,4 +19,7 @@ Eigen::Vector2d PixelOf(const model::View& view, int keypoint);
 // Where the view with this id is among the views (their ids rise); -1 where it is gone.
 int IndexOfView(const model::ObjectModel& object, int id);
 
+// How many points of `a` are seen by `b` too.
+int SharedPoints(const model::View& a, const model::View& b);
+
 }  // namespace vantage::learning

@@ -33,6 +33,10 @@ struct LearnerParams {
   int texture_samples = 600;        // Likewise of its texture, drawn to the colour image; 0 = none.
   int surface_views = 3;            // Both are taken from so many nearest views; >= 1.
   double agreement_prior = 0.9;     // p(o) of a pose found without the mount (or the last frames) that agrees with it; [1/2, 1).
+  double min_surface_agreement = 0.85;  // Where the last frames lead, and this share of the surface is measured in its place, the
+                                        // object is held without interest points; (0, 1]...
+  double surface_prior = 0.99;          // ...and p(o) is this; [1/2, 1)...
+  double max_plain_spread_deg = 0.8;    // ...and a new view wants its axes held this well; > 0.
   // Refinement, beside tracking:
   bool refine = true;            // Loops closed, views and points adjusted, the model tidied up.
   int refine_delay_frames = 15;  // It takes effect so many frames after it began; >= 1.

@@ -60,28 +60,27 @@ pose::BundleProblem ProblemOf(const model::ObjectModel& object, const Sightings&
   return problem;
 }
 
-// A view and how many points it shares with another.
+// A view and how near it is to another.
 struct Kin {
   int view = 0;
-  int shared = 0;
+  int shared = 0;          // Points.
+  double angle_rad = 0.0;  // Between directions.
 };
 
 // The first `count` views but this one, the nearest of kin first: those that share most points with it (they were placed by each
 // other, while direction misleads where drift is being taken out), then the nearest in direction.
 std::vector<Kin> ByKinship(const model::ObjectModel& object, int view, int count) {
-  const std::set<int> own(object.views[view].points.begin(), object.views[view].points.end());
   std::vector<std::tuple<int, double, int>> order;
   for (int other = 0; other < count; ++other) {
     if (other == view) continue;
-    const std::vector<int>& points = object.views[other].points;
-    const auto shared = std::count_if(points.begin(), points.end(), [&](int point) { return own.count(point) > 0; });
+    const int shared = SharedPoints(object.views[view], object.views[other]);
     const double angle =
         geometry::AngleBetween(object.views[view].viewpoint().direction, object.views[other].viewpoint().direction);
-    order.emplace_back(-static_cast<int>(shared), angle, other);
+    order.emplace_back(-shared, angle, other);
   }
   std::sort(order.begin(), order.end());
   std::vector<Kin> kin;
-  for (const auto& [shared, angle, other] : order) kin.push_back({other, -shared});
+  for (const auto& [shared, angle, other] : order) kin.push_back({other, -shared, angle});
   return kin;
 }
 
@@ -94,30 +93,67 @@ pose::Appearance AppearanceInCamera(model::View view, const RefinementParams& pa
   return appearance;
 }
 
-// Which views are held against which: free ones against those that share most points with them. Both ways, since each sees the
-// other's appearance where it is seen best; where depth must not place a view, older ones' against newer images only.
-std::set<std::pair<int, int>> PairsToRelate(const model::ObjectModel& object, int first_free_view, const RefinementParams& params) {
+// How far apart two poses put what a view shows, in the mean.
+double MeanMove(const pose::Appearance& appearance, const geometry::Rigid& T_a, const geometry::Rigid& T_b) {
+  double sum = 0.0;
+  int count = 0;
+  const auto add = [&](const Eigen::Vector3d& point) {
+    sum += (T_a * point - T_b * point).norm();
+    ++count;
+  };
+  for (const pose::SurfacePoint& sample : appearance.surface) add(sample.point);
+  for (const auto& texture : appearance.textures) {
+    for (const pose::TexturePoint& sample : texture) add(sample.point);
+  }
+  return sum / std::max(1, count);
+}
+
+// Two views: what the first looks like is fitted to the images of the second.
+struct Pair {
+  int a = 0;
+  int b = 0;
+  bool is_linked = true;  // They share points, or came one after the other; else only a likeness tells that they show the same.
+
+  bool operator<(const Pair& other) const { return std::tie(a, b) < std::tie(other.a, other.b); }
+};
+using Pairs = std::set<Pair>;
+
+// Free views and the ones learned just before them, whose places to each other tracking has just seen.
+Pairs PairsInARow(const model::ObjectModel& object, int first_free_view) {
+  Pairs pairs;
+  for (int v = first_free_view; v < static_cast<int>(object.views.size()); ++v) {
+    pairs.insert({v - 1, v});
+    pairs.insert({v, v - 1});
+  }
+  return pairs;
+}
+
+// Which views are held against which: free ones against those that share most points with them and, where surfaces help, those
+// beside them that share too few. Both ways, since each sees the other's appearance where it is seen best; where depth must not
+// place a view, older ones' against newer images only.
+Pairs PairsToRelate(const model::ObjectModel& object, int first_free_view, const RefinementParams& params) {
+  constexpr double kMaxAngle_rad = 25.0 * M_PI / 180.0;  // Of views that share too few points.
   const int count = static_cast<int>(object.views.size());
-  std::set<std::pair<int, int>> pairs;
+  Pairs pairs;
   for (int v = first_free_view; v < count; ++v) {
     const std::vector<Kin> kin = ByKinship(object, v, count);
-    for (int i = 0; i < std::min(params.surface_neighbours, static_cast<int>(kin.size())); ++i) {
-      if (kin[i].shared < params.min_shared_points) break;
-      pairs.insert({std::min(v, kin[i].view), std::max(v, kin[i].view)});
-      if (params.use_depth) pairs.insert({std::max(v, kin[i].view), std::min(v, kin[i].view)});
+    for (int i = 0; i < std::min(params.related_views, static_cast<int>(kin.size())); ++i) {
+      const bool is_linked = kin[i].shared >= params.min_shared_points || (params.use_depth && std::abs(v - kin[i].view) <= 2);
+      if (!is_linked && (!params.use_depth || kin[i].angle_rad > kMaxAngle_rad)) continue;
+      pairs.insert({std::min(v, kin[i].view), std::max(v, kin[i].view), is_linked});
+      if (params.use_depth) pairs.insert({std::max(v, kin[i].view), std::min(v, kin[i].view), is_linked});
     }
   }
   return pairs;
 }
 
-// Depth and colour images of free views fitted to those of the views that share most points with them, from where the problem has
-// them.
+// Depth and colour images of pairs of views fitted to each other, from where the problem has them.
 std::vector<pose::BundleRelation> RelationsOf(const model::ObjectModel& object, const pose::BundleProblem& problem,
-                                              int first_free_view, const RefinementParams& params) {
+                                              const Pairs& pairs, const RefinementParams& params) {
   std::vector<pose::BundleRelation> relations;
   pose::Appearance appearance;  // Of view a; pairs come sorted by a.
   int appearance_of = -1;
-  for (const auto& [a, b] : PairsToRelate(object, first_free_view, params)) {
+  for (const auto& [a, b, is_linked] : pairs) {
     if (appearance_of != a) {
       appearance = AppearanceInCamera(object.views[a], params);
       appearance_of = a;
@@ -127,10 +163,9 @@ std::vector<pose::BundleRelation> RelationsOf(const model::ObjectModel& object, 
     const pose::SmoothImage image(frame, cv::Rect({0, 0}, frame.color.size()));
     const geometry::Rigid T_b_a = problem.views[b].T_camera_object * problem.views[a].T_camera_object.inverse();
     const pose::DenseFit fit = pose::FitDensely(appearance, frame, &image, T_b_a, params.dense);
-    if (4 * fit.samples < params.surface_samples && 4 * fit.texture_samples < params.texture_samples) continue;
-    // How far the fit moves what the view is looking at.
-    const Eigen::Vector3d middle(0.0, 0.0, object.views[a].T_camera_object.translation().z());
-    if ((fit.T_camera_object * middle - T_b_a * middle).norm() > params.max_surface_move_m) continue;
+    if (4 * fit.samples <= params.surface_samples && 4 * fit.texture_samples <= params.texture_samples) continue;
+    if (!is_linked && fit.likeness.value_or(0.0) < params.min_likeness) continue;
+    if (MeanMove(appearance, T_b_a, fit.T_camera_object) > params.max_relation_move_m) continue;
     relations.push_back({a, b, fit.T_camera_object, fit.information});
   }
   return relations;
@@ -186,9 +221,10 @@ void RefinementParams::Check() const {
   };
   require(surface_samples >= 0, "surface_samples must be >= 0");
   require(texture_samples >= 0, "texture_samples must be >= 0");
-  require(surface_neighbours >= 1, "surface_neighbours must be >= 1");
+  require(related_views >= 1, "related_views must be >= 1");
   require(min_shared_points >= 1, "min_shared_points must be >= 1");
-  require(max_surface_move_m > 0.0, "max_surface_move_m must be > 0");
+  require(min_likeness >= -1.0 && min_likeness <= 1.0, "min_likeness must be in [-1, 1]");
+  require(max_relation_move_m > 0.0, "max_relation_move_m must be > 0");
   require(max_link_error_sigmas > 0.0, "max_link_error_sigmas must be > 0");
 }
 
@@ -206,9 +242,11 @@ model::ObjectModel Refined(const model::ObjectModel& object, int first_free_view
   pose::BundleParams coarse = params.bundle;
   const bool related = (params.use_depth && params.surface_samples > 0) || params.texture_samples > 0;
   if (related) coarse.tolerance *= 10.0;  // It is only where relations start from.
+  // A plain side's few points would let its views slide; drift between views in a row is small enough to begin with.
+  if (params.use_depth) problem.relations = RelationsOf(object, problem, PairsInARow(object, first_free_view), params);
   report->bundle = pose::AdjustBundle(&problem, coarse);
   if (related) {
-    problem.relations = RelationsOf(object, problem, first_free_view, params);
+    problem.relations = RelationsOf(object, problem, PairsToRelate(object, first_free_view, params), params);
     const pose::BundleReport points_alone = report->bundle;
     pose::BundleParams fine = params.bundle;
     fine.max_anneal = 1.0;  // The start is good.

@@ -17,9 +17,10 @@ struct RefinementParams {
   pose::DenseParams dense;
   int surface_samples = 300;           // Of each view's depth, drawn to its neighbours' depth images; 0 = none.
   int texture_samples = 600;           // Of each view's texture, drawn to its neighbours' colour images; 0 = none.
-  int surface_neighbours = 6;          // A free view is held against so many others, those that share most points; >= 1.
+  int related_views = 6;               // A free view is held against so many others, those that share most points; >= 1.
   int min_shared_points = 6;           // ...if they share so many; >= 1.
-  double max_surface_move_m = 0.008;   // What wants a pair of views further from where points put them is not believed; > 0.
+  double min_likeness = 0.9;           // Pairs that share too few points must look so much alike where they are; [-1, 1].
+  double max_relation_move_m = 0.008;  // What wants a pair of views further from where points put them is not believed; > 0.
   bool use_depth = true;               // false: only the first view's is used (it gives the scale), all else is pixels.
   double max_link_error_sigmas = 8.0;  // A view that is so far off from a point it is said to see saw another one; > 0.
 

@@ -64,8 +64,9 @@ struct Job {
 
   // A view whose links mostly turned out wrong was placed wrongly: with it goes what it brought in.
   static void DropContradicted(int id, int links_before, Refinement* result) {
+    constexpr int kEnough = 6;  // Fewer say nothing.
     const int view = IndexOfView(result->changed, id);
-    if (view <= 0 || 2 * SharedPoints(result->changed, view) >= links_before) return;
+    if (view <= 0 || links_before < kEnough || 2 * SharedPoints(result->changed, view) >= links_before) return;
     result->changed.views.erase(result->changed.views.begin() + view);
     DropUnusedPoints(&result->changed);
     ++result->dropped;

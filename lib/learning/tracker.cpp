@@ -4,8 +4,6 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "learning/keyframe.h"
-
 namespace vantage::learning {
 namespace {
 
@@ -67,10 +65,10 @@ Tracker::Evidence Tracker::EvidenceIn(const rgbd::Frame& frame, const features::
     const cv::Point2f& at = features.keypoints[match.keypoint].pt;
     const Eigen::Vector2d pixel(at.x, at.y);
     evidence.all.push_back(static_cast<int>(evidence.matches.size()));
-    evidence.matches.push_back({pixel, object.points[match.point].position, rgbd::DepthAt(frame, pixel).value_or(0.0)});
+    evidence.matches.push_back({pixel, object.points[match.point].position});  // Depth is the surface's to say.
   }
-  evidence.appearance = AppearanceNear(object, guided.T_camera_object, params_.surface_views,
-                                       frame.depth.empty() ? 0 : params_.surface_samples, params_.texture_samples);
+  evidence.appearance = appearances_->Near(object, guided.T_camera_object);
+  if (frame.depth.empty()) evidence.appearance.surface.clear();
   const std::vector<cv::Point> hull = Outline(object, frame.camera, guided.T_camera_object);
   if (params_.texture_samples > 0 && !hull.empty()) {
     const cv::Rect box = cv::boundingRect(hull);
@@ -101,10 +99,8 @@ geometry::Rigid Tracker::Refined(const rgbd::Frame& frame, const Evidence& evide
   if (mount_pose && Agree(T_camera_object, *mount_pose)) {
     prior = pose::PosePrior{*mount_pose, params_.mount_sigma_m, params_.mount_sigma_deg * M_PI / 180.0};
   }
-  std::vector<pose::Match2d3d> matches = evidence.matches;
-  for (pose::Match2d3d& match : matches) match.depth_m = 0.0;  // The surface says it.
-  return pose::RefinePoseDensely(matches, evidence.all, evidence.appearance, frame, evidence.smooth(), prior, T_camera_object,
-                                 0.5 * params_.recogniser.ransac.inlier_px, params_.refinement.dense);
+  return pose::RefinePoseDensely(evidence.matches, evidence.all, evidence.appearance, frame, evidence.smooth(), prior,
+                                 T_camera_object, 0.5 * params_.recogniser.ransac.inlier_px, params_.refinement.dense);
 }
 
 void Tracker::Weigh(const rgbd::Frame& frame, const Evidence& evidence, Track* track) const {
@@ -114,6 +110,7 @@ void Tracker::Weigh(const rgbd::Frame& frame, const Evidence& evidence, Track* t
   const pose::DenseFit dense =
       pose::FitDensely(independent, frame, evidence.smooth(), track->T_camera_object, params_.refinement.dense, 0);
   track->likeness = dense.likeness;
+  track->surface_agreement = dense.agreement;
   track->spread =
       pose::SpreadOfPose(evidence.matches, evidence.all, frame.camera, track->T_camera_object, kPixelSigma, dense.information);
 }

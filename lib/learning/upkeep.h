@@ -20,7 +20,7 @@ struct UpkeepParams {
   double redundant_angle_deg = 6.0;  // Two views nearer in direction than this...; >= 0.
   double redundant_octaves = 0.25;   // ...and in distance than this are one too many; >= 0.
   int max_views = 150;               // More are thinned out, the most crowded first; >= 2.
-  int min_view_points = 12;          // A view left with fewer features is dropped; >= 0.
+  int min_view_points = 0;           // A view left with fewer features is dropped; >= 0.
 
   void Check() const;  // Throws std::invalid_argument naming the field.
 };

@@ -34,6 +34,26 @@ void AddSurface(const SurfacePoint& sample, const rgbd::Frame& frame, const geom
   ++equations->samples;
 }
 
+// See DenseFit.
+std::optional<double> AgreementOf(const std::vector<SurfacePoint>& surface, const rgbd::Frame& frame, const geometry::Rigid& T) {
+  constexpr int kEnough = 50;
+  constexpr double kMinCosine = 0.3;
+  constexpr double kMaxSigmas = 3.0;
+  constexpr double kModelError_m = 0.001;  // The samples were measured themselves.
+  int measured = 0, agree = 0;
+  for (const SurfacePoint& sample : surface) {
+    const Eigen::Vector3d p = T * sample.point;
+    const Eigen::Vector3d normal = T.linear() * sample.normal;
+    const auto pixel = frame.camera.Project(p);
+    if (!pixel || !frame.camera.Contains(*pixel) || normal.dot(p.normalized()) > -kMinCosine) continue;
+    const auto point = rgbd::PointAt(frame, pixel->array().round(), 1);
+    if (!point) continue;
+    ++measured;
+    agree += std::abs(normal.dot(p - *point)) <= kMaxSigmas * DepthNoise{}.Sigma(point->z()) + kModelError_m;
+  }
+  return measured < kEnough ? std::nullopt : std::optional<double>(static_cast<double>(agree) / measured);
+}
+
 // A texture point as the frame shows it at a pose.
 struct TextureResidual {
   double expected = 0.0;  // Brightness in the view.
@@ -44,12 +64,11 @@ struct TextureResidual {
 std::vector<TextureResidual> ResidualsOf(const std::vector<TexturePoint>& texture, const rgbd::Frame& frame,
                                          const SmoothImage& image, const geometry::Rigid& T) {
   constexpr double kMaxDepthError_m = 0.02;
-  constexpr double kMinCosine = 0.6;  // Nearer to a round outline, smoothing moves what is seen.
   std::vector<TextureResidual> residuals;
   residuals.reserve(texture.size());
   for (const TexturePoint& sample : texture) {
     const Eigen::Vector3d p = T * sample.point;
-    if ((T.linear() * sample.normal).dot(p.normalized()) > -kMinCosine) continue;
+    if ((T.linear() * sample.normal).dot(p.normalized()) > -kMinTextureCosine) continue;
     const auto pixel = frame.camera.Project(p);
     const auto seen = pixel ? image.At(*pixel) : std::nullopt;
     if (!seen) continue;
@@ -203,6 +222,7 @@ geometry::Rigid RefinePoseDensely(const std::vector<Match2d3d>& matches, const s
     for (const SurfacePoint& sample : appearance.surface) AddSurface(sample, frame, T, equations);
     equations->AddScaled(TextureEquations(appearance, frame, image, T, params), 1.0);
     if (prior) AddPrior(*prior, T, equations);
+    HoldWhatSlides(T, equations);
   });
 }
 
@@ -210,21 +230,23 @@ DenseFit FitDensely(const Appearance& appearance, const rgbd::Frame& frame, cons
                     const geometry::Rigid& T_camera_object, const DenseParams& params, int iterations) {
   DenseFit fit;
   fit.T_camera_object = T_camera_object;
+  bool settled = false;
   for (int iteration = 0;; ++iteration) {
     NormalEquations equations = TextureEquations(appearance, frame, image, fit.T_camera_object, params);
     fit.texture_samples = equations.samples;
     for (const SurfacePoint& sample : appearance.surface) AddSurface(sample, frame, fit.T_camera_object, &equations);
     fit.samples = equations.samples - fit.texture_samples;
     fit.information = equations.hessian;
-    if (iteration == iterations) fit.likeness = LikenessOf(appearance, frame, image, fit.T_camera_object);
-    if (iteration == iterations || equations.samples < 6) return fit;
-    // Directions in which the object slides are held by a weight that is little beside any that it does not slide in.
-    const double held = 1e-4 * equations.hessian.topLeftCorner<3, 3>().trace();
-    equations.hessian.diagonal().head<3>().array() += held;
-    equations.hessian.diagonal().tail<3>().array() += held * fit.T_camera_object.translation().squaredNorm();
+    if (settled || iteration == iterations) {
+      fit.likeness = LikenessOf(appearance, frame, image, fit.T_camera_object);
+      fit.agreement = AgreementOf(appearance.surface, frame, fit.T_camera_object);
+    }
+    if (settled || iteration == iterations || equations.samples < 6) return fit;
+    HoldWhatSlides(fit.T_camera_object, &equations);
     const Vector6d delta = -equations.hessian.ldlt().solve(equations.gradient);
     if (!delta.allFinite()) return fit;
     fit.T_camera_object = Perturbed(fit.T_camera_object, delta);
+    settled = delta.norm() < kSmallestStep;
   }
 }
 

@@ -24,6 +24,10 @@ struct TexturePoint {
   double brightness = 0.0;  // Of the smoothed image, grey levels.
 };
 
+// Least cosine between normal and ray at which texture is read or compared: what is seen more slantwise is smeared, and near a
+// round outline smoothing moves it.
+constexpr double kMinTextureCosine = 0.6;
+
 // The grey image that texture is read from and compared in: smoothed, so that it changes slowly from pixel to pixel.
 class SmoothImage {
  public:
@@ -63,7 +67,7 @@ struct DenseParams {
 geometry::Rigid RefinePoseDensely(const std::vector<Match2d3d>& matches, const std::vector<int>& index,
                                   const Appearance& appearance, const rgbd::Frame& frame, const SmoothImage* image,
                                   const std::optional<PosePrior>& prior, const geometry::Rigid& T_camera_object, double scale_px,
-                                  const DenseParams& params, int iterations = 10);
+                                  const DenseParams& params, int iterations = 30);
 
 // What surface and texture alone say about a pose.
 struct DenseFit {
@@ -73,11 +77,13 @@ struct DenseFit {
   int texture_samples = 0;
   std::optional<double> likeness;  // Correlation of the brightness that was expected with what is seen, of the view that looks most
                                    // alike; nullopt where none shows enough texture.
+  std::optional<double> agreement;  // Share of the surface that should be seen, and has depth there, that is measured in its place;
+                                    // nullopt where there is little of it.
 };
 
 // The pose that draws surface and texture to the frame (as above, but nothing else speaks). Where the object could slide along
 // itself the pose stays; the information says which way. Cost: about 0.2 ms for 300 samples.
 DenseFit FitDensely(const Appearance& appearance, const rgbd::Frame& frame, const SmoothImage* image,
-                    const geometry::Rigid& T_camera_object, const DenseParams& params, int iterations = 10);
+                    const geometry::Rigid& T_camera_object, const DenseParams& params, int iterations = 30);
 
 }  // namespace vantage::pose

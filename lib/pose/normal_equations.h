@@ -48,23 +48,33 @@ struct NormalEquations {
   }
 };
 
+// Steps in metres and radians below which a pose has settled.
+constexpr double kSmallestStep = 1e-5;
+
+// Holds directions in which the object could slide by a weight that is little beside any in which it could not.
+inline void HoldWhatSlides(const geometry::Rigid& T, NormalEquations* equations) {
+  const double held = 1e-4 * equations->hessian.topLeftCorner<3, 3>().trace();
+  equations->hessian.diagonal().head<3>().array() += held;
+  equations->hessian.diagonal().tail<3>().array() += held * T.translation().squaredNorm();
+}
+
 // The weight of a squared error where one of `scale` weighs half.
 inline double Cauchy(double squared, double scale) { return 1.0 / (1.0 + squared / (scale * scale)); }
 
-// Gauss-Newton; `add` puts all residuals at a pose into the equations. The start where fewer than three matches took part or the
-// equations do not solve.
+// Gauss-Newton; `add` puts all residuals at a pose into the equations. The start where neither three matches nor six samples took
+// part or the equations do not solve.
 template <typename AddAll>
 geometry::Rigid GaussNewton(const geometry::Rigid& start, int iterations, const AddAll& add) {
   geometry::Rigid T = start;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     NormalEquations equations;
     add(T, &equations);
-    if (equations.matches < 3) return start;
+    if (equations.matches < 3 && equations.samples < 6) return start;
     equations.hessian.diagonal() *= 1.0 + 1e-6;
     const Vector6d delta = -equations.hessian.ldlt().solve(equations.gradient);
     if (!delta.allFinite()) return start;
     T = Perturbed(T, delta);
-    if (delta.norm() < 1e-8) break;
+    if (delta.norm() < kSmallestStep) break;
   }
   return T;
 }

@@ -30,7 +30,6 @@ PoseSpread SpreadOfPose(const std::vector<Match2d3d>& matches, const std::vector
   for (const int i : index) {
     AddMatch(matches[i], camera, T_camera_object, kEveryMatchCounts, &equations);
   }
-  if (equations.matches < 3) return {kInfinite, kInfinite};
   const Matrix6d information = equations.hessian / (pixel_sigma * pixel_sigma) + other_information;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information);
   if (!(solver.eigenvalues()(0) > 1e-9 * solver.eigenvalues()(5))) return {kInfinite, kInfinite};

@@ -55,9 +55,11 @@ GuidedPose MatchGuided(const model::ObjectModel& object, const geometry::Rigid& 
       matches.push_back({{pixel.x, pixel.y}, object.points[partner.second.point].position, depth_m});
       sources.push_back(partner.second);
     }
-    std::vector<int> all(matches.size());
-    std::iota(all.begin(), all.end(), 0);
-    result.T_camera_object = pose::RefinePose(matches, all, frame.camera, result.T_camera_object, 0.5 * params.inlier_px);
+    if (static_cast<int>(matches.size()) >= params.min_matches) {
+      std::vector<int> all(matches.size());
+      std::iota(all.begin(), all.end(), 0);
+      result.T_camera_object = pose::RefinePose(matches, all, frame.camera, result.T_camera_object, 0.5 * params.inlier_px);
+    }
     result.matches.clear();
     for (size_t i = 0; i < matches.size(); ++i) {
       if (pose::ReprojectionError(matches[i], frame.camera, result.T_camera_object) < params.inlier_px)

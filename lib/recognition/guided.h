@@ -15,6 +15,7 @@ struct GuidedParams {
   double max_distance = 0.65;  // Descriptor distance of a match; (0, 2].
   double inlier_px = 3.0;      // Reprojection error of a match that supports the refined pose; > 0.
   int views = 4;               // Nearest views whose points are used; >= 1.
+  int min_matches = 6;         // Fewer do not move the pose: they are wrong too often; >= 3.
 };
 
 struct GuidedMatch {
@@ -30,7 +31,8 @@ struct GuidedPose {
 };
 
 // `frame` gives the camera and, where it has depth, the measured depth that refinement uses as well.
-// Two rounds of matching and refinement from `T_camera_object`. Points that face away by more than 80 degrees are left out.
+// Two rounds of matching, and of refinement where there are enough matches, from `T_camera_object`. Points that face away by more
+// than 80 degrees are left out.
 GuidedPose MatchGuided(const model::ObjectModel& object, const geometry::Rigid& T_camera_object, const rgbd::Frame& frame,
                        const features::Features& features, const model::KeypointGrid& grid, const GuidedParams& params);
 

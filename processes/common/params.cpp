@@ -132,9 +132,10 @@ void Fields(Visitor& visit, learning::RefinementParams& params) {
   visit.Nested("dense", params.dense);
   visit("surface_samples", params.surface_samples);
   visit("texture_samples", params.texture_samples);
-  visit("surface_neighbours", params.surface_neighbours);
+  visit("related_views", params.related_views);
   visit("min_shared_points", params.min_shared_points);
-  visit("max_surface_move_m", params.max_surface_move_m);
+  visit("min_likeness", params.min_likeness);
+  visit("max_relation_move_m", params.max_relation_move_m);
   visit("use_depth", params.use_depth);
   visit("max_link_error_sigmas", params.max_link_error_sigmas);
 }
@@ -144,6 +145,7 @@ void Fields(Visitor& visit, learning::LoopClosureParams& params) {
   visit("max_view_angle_deg", params.max_view_angle_deg);
   visit("max_octaves", params.max_octaves);
   visit("max_shared", params.max_shared);
+  visit("min_views_between", params.min_views_between);
   visit("max_candidates", params.max_candidates);
   visit("max_ratio", params.max_ratio);
   visit.Nested("ransac", params.ransac);
@@ -190,6 +192,9 @@ void Fields(Visitor& visit, learning::LearnerParams& params) {
   visit("texture_samples", params.texture_samples);
   visit("surface_views", params.surface_views);
   visit("agreement_prior", params.agreement_prior);
+  visit("min_surface_agreement", params.min_surface_agreement);
+  visit("surface_prior", params.surface_prior);
+  visit("max_plain_spread_deg", params.max_plain_spread_deg);
   visit("refine", params.refine);
   visit("refine_delay_frames", params.refine_delay_frames);
   visit("refined_views", params.refined_views);
