@@ -7,25 +7,15 @@
 
 #include "learning/keyframe.h"
 #include "learning/model_edit.h"
+#include "learning/motion.h"
+#include "learning/mount_witness.h"
 #include "learning/refiner.h"
 #include "learning/tracker.h"
 
 namespace vantage::learning {
 namespace {
 
-constexpr double kSeen = 0.5;       // p(o|c) from which a pose counts as the object's.
-constexpr double kMaxGap_s = 0.25;  // After a longer gap between frames the last motion says nothing about where the object is.
-
-double Seconds(std::int64_t from_us, std::int64_t to_us) { return 1e-6 * static_cast<double>(to_us - from_us); }
-
-// Where the object was in the last frames.
-struct History {
-  geometry::Rigid T_camera_object = geometry::Rigid::Identity();
-  std::int64_t utime = 0;
-  std::optional<geometry::Rigid> before;  // In the frame before that one, where it was tracked there.
-  std::int64_t before_utime = 0;
-  double error_px = 0.0;  // How far the last prediction was off.
-};
+constexpr double kSeen = 0.5;  // p(o|c) from which a pose counts as the object's.
 
 // Where depth must not help to place the object in a frame it must not help to refine views either.
 LearnerParams WithoutDepthWhereNotWanted(LearnerParams params) {
@@ -71,10 +61,8 @@ struct Learner::Impl {
   State state = State::kSearching;
   int confirmations = 0;  // Frames that agreed since the object was found again.
   int reference_view = -1;
-  std::optional<History> history;
-  std::optional<geometry::Rigid> T_world_object;
-  std::optional<geometry::Rigid> T_world_elsewhere;  // Where it was found while it was gone from there.
-  int elsewhere = 0;                                 // So many times in a row.
+  Motion motion;
+  MountWitness mount;
   std::optional<segmentation::Plane> plane;
   std::vector<segmentation::Cluster> clusters;
 
@@ -84,7 +72,8 @@ struct Learner::Impl {
         tracker(p),
         recogniser(p.recogniser),
         others(p.recogniser),
-        refiner(params) {}
+        refiner(params),
+        mount(params, tracker) {}
 
   void Adopt(model::ObjectModel changed) {
     object = std::make_shared<const model::ObjectModel>(std::move(changed));
@@ -132,8 +121,8 @@ struct Learner::Impl {
       return result;
     }
     Adopt(std::move(*first));
-    if (frame.T_world_camera) T_world_object = *frame.T_world_camera * T_camera_object;
-    Remember(frame, T_camera_object, std::nullopt);
+    mount.Note(frame, T_camera_object);
+    motion.Found(*object, frame.camera, T_camera_object, frame.utime);
     reference_view = 0;
     state = result.state = State::kTracking;
     result.T_camera_object = T_camera_object;
@@ -161,32 +150,17 @@ struct Learner::Impl {
 
   // --- Where the object is expected ---
 
-  // Where the mount says the object is, if it says.
-  std::optional<geometry::Rigid> MountPose(const rgbd::Frame& frame) const {
-    if (!frame.T_world_camera || !T_world_object) return std::nullopt;
-    return frame.T_world_camera->inverse() * *T_world_object;
-  }
-
-  // Where the motion of the last frames leads. nullopt where the object was not seen of late.
-  std::optional<geometry::Rigid> Predicted(const rgbd::Frame& frame) const {
-    if (!history) return std::nullopt;
-    const double ahead_s = Seconds(history->utime, frame.utime);
-    if (!history->before || ahead_s > kMaxGap_s) return history->T_camera_object;
-    return Continued(*history->before, history->T_camera_object, Seconds(history->before_utime, history->utime), ahead_s);
-  }
-
   std::optional<Expectation> Expected(const rgbd::Frame& frame) const {
-    const auto predicted = Predicted(frame);
-    const auto mount_pose = MountPose(frame);
+    const auto predicted = motion.Predicted(frame.utime);
+    const auto mount_pose = mount.PoseIn(frame);
     if (!predicted && !mount_pose) return std::nullopt;
     Expectation expectation;
     expectation.T_camera_object = mount_pose ? *mount_pose : *predicted;
     const double distance = std::max(0.05, expectation.T_camera_object.translation().norm());
     const double size_px = frame.camera.fx * Size() / distance;
-    const bool steady = !mount_pose && history->before && Seconds(history->utime, frame.utime) <= kMaxGap_s;
-    expectation.steady = steady;
+    expectation.steady = !mount_pose && motion.IsSteady(frame.utime);
     expectation.margin_px =
-        steady ? std::max(params.min_roi_margin_px, 3.0 * history->error_px) : params.roi_margin * size_px + 20.0;
+        expectation.steady ? std::max(params.min_roi_margin_px, 3.0 * motion.error_px()) : params.roi_margin * size_px + 20.0;
     return expectation;
   }
 
@@ -197,24 +171,7 @@ struct Learner::Impl {
     return (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).maxCoeff();
   }
 
-  void Remember(const rgbd::Frame& frame, const geometry::Rigid& T_camera_object, const std::optional<geometry::Rigid>& predicted) {
-    History now;
-    now.T_camera_object = T_camera_object;
-    now.utime = frame.utime;
-    if (history && Seconds(history->utime, frame.utime) <= kMaxGap_s) {
-      now.before = history->T_camera_object;
-      now.before_utime = history->utime;
-      if (predicted) now.error_px = LargestShift(*object, frame.camera, *predicted, T_camera_object);
-    }
-    history = now;
-  }
-
   // --- Tracking ---
-
-  bool ContradictsMount(const rgbd::Frame& frame, const geometry::Rigid& T_camera_object) const {
-    const auto expected = MountPose(frame);
-    return params.require_mount_agreement && expected && !tracker.Agree(T_camera_object, *expected);
-  }
 
   // Whether a pose is where the last frames lead, and the surface is measured there: the object has been followed to it, whatever
   // interest points say.
@@ -231,7 +188,7 @@ struct Learner::Impl {
   }
 
   bool IsGood(const rgbd::Frame& frame, const Track& track) const {
-    return track.probability >= kSeen && !ContradictsMount(frame, track.T_camera_object);
+    return track.probability >= kSeen && !mount.Contradicts(frame, track.T_camera_object);
   }
 
   // The reference view and the views beside it.
@@ -246,7 +203,7 @@ struct Learner::Impl {
   // Around where it is expected: the reference view first, its neighbours, then the whole model where the mount or a steady motion
   // says it is.
   std::optional<Found> Follow(const rgbd::Frame& frame, const Expectation& expectation) const {
-    const auto mount_pose = MountPose(frame);
+    const auto mount_pose = mount.PoseIn(frame);
     const features::Features features = tracker.ExtractAround(*object, frame, expectation);
     const auto judged = [&](Found found) {
       found.continued = Continues(frame, expectation, found.track);
@@ -272,8 +229,8 @@ struct Learner::Impl {
     const features::Features features = CurrentRecogniser().Extract(frame);
     const auto detections = CurrentRecogniser().Recognise(frame, features);
     if (detections.empty()) return std::nullopt;
-    Track track = tracker.At(*object, frame, features, detections.front().T_camera_object, true, MountPose(frame));
-    CreditAgreement(MountPose(frame), params.agreement_prior, &track);
+    Track track = tracker.At(*object, frame, features, detections.front().T_camera_object, true, mount.PoseIn(frame));
+    CreditAgreement(mount.PoseIn(frame), params.agreement_prior, &track);
     return track;
   }
 
@@ -298,68 +255,22 @@ struct Learner::Impl {
   // The state after the object was found.
   State StateOf(const rgbd::Frame& frame, const Found& found) {
     if (state == State::kTracking && found.followed) return State::kTracking;
-    const auto mount_pose = MountPose(frame);
-    const bool sure = found.track.probability >= params.sure_probability ||
-                      (mount_pose && tracker.Agree(found.track.T_camera_object, *mount_pose));
+    const bool sure = found.track.probability >= params.sure_probability || mount.Agrees(frame, found.track.T_camera_object);
     confirmations = found.followed ? confirmations + 1 : 0;
     return sure || confirmations >= params.confirm_frames ? State::kTracking : State::kRelocalising;
   }
 
   LearnerResult Lose(LearnerResult result, const std::string& note) {
     state = result.state = State::kLost;
-    history.reset();
+    motion.Lost();
     result.note = note;
     return result;
   }
 
-  // Whether the depth image looks through most of the surface that should be seen where the mount says the object is.
-  bool IsGone(const rgbd::Frame& frame, const geometry::Rigid& T_camera_object) const {
-    constexpr int kMinSamples = 50;
-    constexpr double kBehind_m = 0.03;
-    int seen = 0, behind = 0;
-    for (const pose::SurfacePoint& sample : tracker.AppearanceAt(*object, T_camera_object).surface) {
-      const Eigen::Vector3d point = T_camera_object * sample.point;
-      if ((T_camera_object.linear() * sample.normal).dot(point.normalized()) > -0.2) continue;
-      const auto pixel = frame.camera.Project(point);
-      const auto depth = pixel ? rgbd::DepthAt(frame, *pixel, 1) : std::nullopt;
-      if (!depth) continue;
-      ++seen;
-      behind += *depth > point.z() + kBehind_m;
-    }
-    return seen >= kMinSamples && 2 * behind > seen;
-  }
-
-  // The object was found where, by the mount, it is not. Seen gone from its place and found in one other place again and again, it
-  // was moved.
-  bool WasMoved(const rgbd::Frame& frame, const Track& track) {
-    if (track.probability < params.min_track_probability || !IsGone(frame, *MountPose(frame))) {
-      elsewhere = 0;
-      return false;
-    }
-    const geometry::Rigid T_world_found = *frame.T_world_camera * track.T_camera_object;
-    elsewhere = T_world_elsewhere && tracker.Agree(T_world_found, *T_world_elsewhere) ? elsewhere + 1 : 1;
-    T_world_elsewhere = T_world_found;
-    if (elsewhere < params.moved_frames) return false;
-    T_world_object = T_world_found;
-    elsewhere = 0;
-    return true;
-  }
-
   // --- Refinement ---
 
-  // Where the mount says the object is in each view that was taken with the mount's pose known and agrees with it.
-  std::map<int, pose::PosePrior> MountPriors() const {
-    std::map<int, pose::PosePrior> priors;
-    for (const model::View& view : object->views) {
-      const auto mount_pose = MountPose(view.keyframe);
-      if (!mount_pose || !tracker.Agree(view.T_camera_object, *mount_pose)) continue;
-      priors[view.id] = {*mount_pose, params.mount_sigma_m, params.mount_sigma_deg * M_PI / 180.0};
-    }
-    return priors;
-  }
-
   void StartRefinement() {
-    if (params.refine && refiner.IsDue()) refiner.Start(frame_number, object, statistics, MountPriors());
+    if (params.refine && refiner.IsDue()) refiner.Start(frame_number, object, statistics, mount.Priors(*object));
   }
 
   // The refined model, with what was learned since, in place of the one there is.
@@ -374,18 +285,10 @@ struct Learner::Impl {
       moved[new_index[p]].seen += statistics[p].seen;
     }
     statistics = std::move(moved);
-    if (history && reference_id >= 0) {
-      // The object stays where it is in the image; its coordinates have changed.
-      const geometry::Rigid T_before_after = ChangeOf(*object, rebased, reference_id).inverse();
-      history->T_camera_object = history->T_camera_object * T_before_after;
-      if (history->before) history->before = *history->before * T_before_after;
-    }
+    if (reference_id >= 0) motion.ChangeObject(ChangeOf(*object, rebased, reference_id).inverse());
     Adopt(std::move(rebased));
-    reference_view = -1;
-    for (size_t v = 0; v < object->views.size(); ++v) {
-      if (object->views[v].id == reference_id) reference_view = static_cast<int>(v);
-    }
-    if (reference_view < 0 && history) reference_view = model::NearestViews(*object, history->T_camera_object, 1).front();
+    reference_view = IndexOfView(*object, reference_id);
+    if (reference_view < 0 && motion.last()) reference_view = model::NearestViews(*object, *motion.last(), 1).front();
   }
 
   // How the points fare that ought to be seen in a frame the object is surely tracked in.
@@ -409,8 +312,7 @@ struct Learner::Impl {
 
   bool IsHeld(const rgbd::Frame& frame, const Found& found) const {
     const Track& track = found.track;
-    const auto mount_pose = MountPose(frame);
-    if (mount_pose && tracker.Agree(track.T_camera_object, *mount_pose)) return true;
+    if (mount.Agrees(frame, track.T_camera_object)) return true;
     const bool linked = found.continued || static_cast<int>(track.matches.size()) >= params.min_links;
     return linked && track.spread.sigma_m <= params.max_spread_m &&
            track.spread.sigma_rad <= (found.continued ? params.max_plain_spread_deg : params.max_spread_deg) * M_PI / 180.0 &&
@@ -463,10 +365,8 @@ struct Learner::Impl {
   // Follows the object through a frame whose pose was found.
   LearnerResult Advance(const rgbd::Frame& frame, const Found& found, LearnerResult result, bool pose_is_known) {
     const Track& track = found.track;
-    Remember(frame, track.T_camera_object, Predicted(frame));
-    if (!T_world_object && frame.T_world_camera && state == State::kTracking) {
-      T_world_object = *frame.T_world_camera * track.T_camera_object;
-    }
+    motion.Found(*object, frame.camera, track.T_camera_object, frame.utime);
+    if (state == State::kTracking) mount.Note(frame, track.T_camera_object);
     result.T_camera_object = track.T_camera_object;
     result.note = state == State::kTracking ? AddView(frame, found, pose_is_known) : "found again, not yet surely";
     result.view_added = result.note.empty();
@@ -496,7 +396,7 @@ struct Learner::Impl {
     result.inliers = static_cast<int>(track.matches.size());
     result.spread = track.spread;
     result.likeness = track.likeness;
-    if (!known_pose && ContradictsMount(frame, track.T_camera_object) && !WasMoved(frame, track)) {
+    if (!known_pose && mount.Contradicts(frame, track.T_camera_object) && !mount.WasMoved(frame, *object, track)) {
       return Lose(result, "the track contradicts the mount's pose");
     }
     if (!known_pose && track.probability < kSeen) return Lose(result, "the object was not found");
@@ -548,7 +448,7 @@ bool Learner::FinishRefinement() {
     changed = true;
   }
   if (!impl_->params.refine || impl_->refiner.views_added() == 0) return changed;
-  impl_->TakeEffect(impl_->refiner.RefineAll(impl_->object, impl_->MountPriors()));
+  impl_->TakeEffect(impl_->refiner.RefineAll(impl_->object, impl_->mount.Priors(*impl_->object)));
   return true;
 }
 
@@ -561,6 +461,6 @@ void Learner::SetMeasures(const measures::Measures& measures) {
 
 const std::optional<segmentation::Plane>& Learner::plane() const { return impl_->plane; }
 const std::vector<segmentation::Cluster>& Learner::clusters() const { return impl_->clusters; }
-std::optional<geometry::Rigid> Learner::T_world_object() const { return impl_->T_world_object; }
+std::optional<geometry::Rigid> Learner::T_world_object() const { return impl_->mount.T_world_object(); }
 
 }  // namespace vantage::learning

@@ -154,26 +154,4 @@ std::optional<Track> Tracker::AgainstView(const model::ObjectModel& object, int 
   return At(object, frame, features, estimate->T_camera_object, true, mount_pose);
 }
 
-double LargestShift(const model::ObjectModel& object, const geometry::PinholeCamera& camera,
-                    const geometry::Rigid& T_camera_object_a, const geometry::Rigid& T_camera_object_b) {
-  double largest = 0.0;
-  for (const model::ModelPoint& point : object.points) {
-    const auto a = camera.Project(T_camera_object_a * point.position);
-    const auto b = camera.Project(T_camera_object_b * point.position);
-    if (a && b) largest = std::max(largest, (*a - *b).norm());
-  }
-  return largest;
-}
-
-geometry::Rigid Continued(const geometry::Rigid& before, const geometry::Rigid& last, double last_interval_s, double ahead_s) {
-  if (!(last_interval_s > 0.0) || !(ahead_s > 0.0)) return last;
-  const double share = std::min(3.0, ahead_s / last_interval_s);
-  const geometry::Rigid motion = before.inverse() * last;  // In the object's frame: small, whatever the distance.
-  const Eigen::AngleAxisd turn(motion.linear());
-  geometry::Rigid step = geometry::Rigid::Identity();
-  step.linear() = Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
-  step.translation() = share * motion.translation();
-  return last * step;
-}
-
 }  // namespace vantage::learning

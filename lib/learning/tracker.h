@@ -74,13 +74,4 @@ class Tracker {
   std::unique_ptr<AppearanceCache> appearances_;
 };
 
-// The largest distance, in pixels, by which any of the object's points moves between the two poses; 0 where none is in front of
-// the camera.
-double LargestShift(const model::ObjectModel& object, const geometry::PinholeCamera& camera,
-                    const geometry::Rigid& T_camera_object_a, const geometry::Rigid& T_camera_object_b);
-
-// Where a steady motion leads: `before` and `last` are T_camera_object `last_interval_s` apart; the result is `ahead_s` after
-// `last`. No more than three intervals ahead.
-geometry::Rigid Continued(const geometry::Rigid& before, const geometry::Rigid& last, double last_interval_s, double ahead_s);
-
 }  // namespace vantage::learning

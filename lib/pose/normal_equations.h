@@ -53,9 +53,13 @@ constexpr double kSmallestStep = 1e-5;
 
 // Holds directions in which the object could slide by a weight that is little beside any in which it could not.
 inline void HoldWhatSlides(const geometry::Rigid& T, NormalEquations* equations) {
+  constexpr double kObjectSize_m = 0.05;
   const double held = 1e-4 * equations->hessian.topLeftCorner<3, 3>().trace();
-  equations->hessian.diagonal().head<3>().array() += held;
-  equations->hessian.diagonal().tail<3>().array() += held * T.translation().squaredNorm();
+  // A turn is one about the object's origin, not the camera's: that would carry a plain wall along itself.
+  Eigen::Matrix<double, 3, 6> of_origin;
+  of_origin << Eigen::Matrix3d::Identity(), -Cross(T.translation());
+  equations->hessian += held * of_origin.transpose() * of_origin;
+  equations->hessian.diagonal().tail<3>().array() += held * kObjectSize_m * kObjectSize_m;
 }
 
 // The weight of a squared error where one of `scale` weighs half.

@@ -23,6 +23,8 @@ struct LearnerOptions {
   std::vector<std::string> meshes;
   std::string swapped_for;
   std::string fault = "none";
+  std::optional<double> fault_start_s;  // None = as the orbit's default.
+  double fault_turn_share = simulation::FaultParams().turn_share;
   int frames = 0;   // 0 = all of the orbit.
   int circles = 0;  // 0 = one at each elevation.
   bool quick = false;
@@ -68,6 +70,7 @@ simulation::SequenceParams SequenceOf(const LearnerOptions& options, const simul
   params.tell_camera_pose = options.tell_poses;
   params.orbit.start_azimuth_deg = options.start_azimuth_deg.value_or(BroadestSide_deg(world.Truth().at(0)));
   params.fault.fault = simulation::FaultFromString(options.fault);
+  params.fault.turn_share = options.fault_turn_share;
   if (options.circles > 0) {
     const std::vector<double> elevations_deg = params.orbit.elevations_deg;
     params.orbit.elevations_deg.clear();
@@ -78,6 +81,7 @@ simulation::SequenceParams SequenceOf(const LearnerOptions& options, const simul
     params.rate_hz = 10.0;
     params.fault.start_s = 3.0;
   }
+  params.fault.start_s = options.fault_start_s.value_or(params.fault.start_s);
   return params;
 }
 
@@ -262,6 +266,14 @@ void AddEvaluateLearner(CLI::App& evaluate, Run& run) {
   verb->add_option("--fault", options->fault, "What goes wrong on the way")
       ->check(CLI::IsMember(simulation::FaultNames()))
       ->capture_default_str();
+  verb->add_option("--fault-start", options->fault_start_s,
+                   "When, seconds (default 4, with --quick 3); on a later circle every side is known when it is over")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("S");
+  verb->add_option("--fault-speed", options->fault_turn_share, "The camera goes on at this share of its speed meanwhile")
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str()
+      ->type_name("SHARE");
   verb->add_option("--swapped-for", options->swapped_for, "With --fault swapped and --mesh: the mesh that takes the object's place")
       ->type_name("MESH");
   verb->add_option("--frames", options->frames, "Stop after so many frames (default: all circles)")

@@ -73,6 +73,58 @@ TEST(Learner, RefusesATrackThatContradictsTheMount) {
   EXPECT_NE(result.note.find("mount"), std::string::npos) << result.note;
 }
 
+// Found again and again in another place, and its own seen empty, the object was moved: it is tracked there.
+TEST(Learner, AnObjectThatWasMovedIsTrackedWhereItIs) {
+  VANTAGE_NEEDS_DATA("shelf_box");
+  auto frames = ShelfFrames(12);
+  LearnerParams params;
+  params.moved_frames = 4;
+  Learner learner(params, "carton");
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(learner.Process(frames[i]).state, State::kTracking) << i;
+  const geometry::Rigid before = *learner.T_world_object();
+  const Eigen::Vector3d moved_m = frames[3].T_world_camera->linear() * Eigen::Vector3d(0.0, 0.0, 0.15);
+  std::vector<bool> found;
+  for (int i = 3; i < 12; ++i) {
+    frames[i].T_world_camera->pretranslate(moved_m);  // As if the camera had gone after a box that was pushed away.
+    found.push_back(learner.Process(frames[i]).T_camera_object.has_value());
+  }
+  EXPECT_EQ(found, (std::vector<bool>{false, false, false, true, true, true, true, true, true}));
+  const geometry::Rigid after = *learner.T_world_object();
+  EXPECT_LT((after.translation() - before.translation() - moved_m).norm(), 0.02);
+}
+
+TEST(Learner, LearnsOnlyFromAPoseThatIsHeld) {
+  VANTAGE_NEEDS_DATA("shelf_box");
+  const auto frames = ShelfFrames(10);
+  const auto views_with = [&](const LearnerParams& params) {
+    Learner learner(params, "carton");
+    for (const rgbd::Frame& frame : frames) {
+      const LearnerResult result = learner.Process(WithoutPose(frame));
+      if (!result.T_camera_object || result.confidence.value >= 1.0) continue;
+      EXPECT_GT(result.spread.sigma_m, 0.0);
+      EXPECT_GT(result.likeness.value_or(0.0), 0.5);
+    }
+    return learner.object()->views.size();
+  };
+  LearnerParams params;
+  params.new_view_confidence = 0.95;
+  params.min_view_angle_deg = 2.0;
+  const size_t held = views_with(params);
+  EXPECT_GT(held, 1u);
+  const auto but = [&](auto change) {
+    LearnerParams changed = params;
+    change(&changed);
+    return views_with(changed);
+  };
+  EXPECT_EQ(but([](LearnerParams* p) { p->max_spread_m = 1e-6; }), 1u);
+  EXPECT_EQ(but([](LearnerParams* p) { p->min_likeness = 1.0; }), 1u);
+  EXPECT_LT(but([](LearnerParams* p) {
+              p->min_links = 10000;
+              p->min_surface_agreement = 1.0;
+            }),
+            held);
+}
+
 TEST(Learner, ContinuesAKnownModelWithoutANewOne) {
   VANTAGE_NEEDS_DATA("shelf_box");
   const auto frames = ShelfFrames(3);

@@ -124,6 +124,32 @@ TEST_F(Dense, HoldsAPoseThatMatchesPlaceWrongly) {
   EXPECT_LT(placed(appearance_, &image).translation_m, 0.3 * placed({appearance_.surface, {}}, nullptr).translation_m);
 }
 
+// How much a pose looks like the object, and how much of its surface is there, as they are (no step is taken).
+TEST_F(Dense, LikenessAndAgreementTellWhetherTheObjectIsThere) {
+  const rgbd::Frame frame = Picture(truth_, 0.8, 10.0);
+  const SmoothImage image(frame, cv::Rect({0, 0}, frame.color.size()));
+  const auto at = [&](const geometry::Rigid& T) { return FitDensely(appearance_, frame, &image, T, {}, 0); };
+  const DenseFit right = at(truth_);
+  ASSERT_TRUE(right.likeness && right.agreement);
+  EXPECT_GT(*right.likeness, 0.98);
+  EXPECT_GT(*right.agreement, 0.98);
+  geometry::Rigid beside = truth_;  // Seven pixels along itself: the surface is there, its print is not.
+  beside.translate(Eigen::Vector3d(0.008, 0.0, 0.0));
+  EXPECT_LT(at(beside).likeness.value(), 0.5);
+  EXPECT_GT(at(beside).agreement.value(), 0.95);
+  geometry::Rigid nearer = truth_;
+  nearer.pretranslate(Eigen::Vector3d(0.0, 0.0, -0.03));
+  EXPECT_LT(at(nearer).agreement.value(), 0.05);
+}
+
+TEST_F(Dense, ASurfaceAloneHoldsThePoseAsFarAsItCan) {
+  const rgbd::Frame frame = Picture(truth_, 1.0, 0.0);
+  const geometry::Rigid start = Pose(4.0, 14.0, 0.006, -0.004);  // Four degrees of tilt, and no interest point at all.
+  const auto placed = RefinePoseDensely({}, {}, {appearance_.surface, {}}, frame, nullptr, std::nullopt, start, 1.5, {});
+  EXPECT_LT(geometry::Difference(placed, truth_).rotation_rad, 0.1 * M_PI / 180.0);
+  EXPECT_LT(geometry::Difference(placed, truth_).translation_m, 0.0005);  // It did not slide either.
+}
+
 TEST_F(Dense, NothingToSeeLeavesThePoseAsItIs) {
   rgbd::Frame blank = Picture(truth_, 0.0, 90.0);
   blank.depth = cv::Mat();
@@ -131,6 +157,8 @@ TEST_F(Dense, NothingToSeeLeavesThePoseAsItIs) {
   EXPECT_FALSE(image.At({10.0, 10.0}));
   const DenseFit fit = FitDensely(appearance_, blank, &image, start_, {});
   EXPECT_EQ(fit.samples, 0);
+  EXPECT_FALSE(fit.likeness);
+  EXPECT_FALSE(fit.agreement);
   EXPECT_TRUE(fit.T_camera_object.isApprox(start_));
   EXPECT_FALSE(SmoothImage(blank, cv::Rect(1000, 1000, 5, 5)).At({100.0, 100.0}));
 }
