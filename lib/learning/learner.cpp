@@ -310,19 +310,25 @@ struct Learner::Impl {
 
   // --- New views ---
 
-  bool IsHeld(const rgbd::Frame& frame, const Found& found) const {
+  // How well a pose must be held to be learned from.
+  enum class Hold {
+    kNone,
+    kPlain,  // Followed to where the surface shows, less well than is wanted: enough not to lose a plain object.
+    kFirm,
+  };
+  Hold HoldOf(const rgbd::Frame& frame, const Found& found) const {
     const Track& track = found.track;
-    if (mount.Agrees(frame, track.T_camera_object)) return true;
-    const bool linked = found.continued || static_cast<int>(track.matches.size()) >= params.min_links;
-    return linked && track.spread.sigma_m <= params.max_spread_m &&
-           track.spread.sigma_rad <= (found.continued ? params.max_plain_spread_deg : params.max_spread_deg) * M_PI / 180.0 &&
-           track.likeness.value_or(1.0) >= params.min_likeness;
+    if (mount.Agrees(frame, track.T_camera_object)) return Hold::kFirm;
+    const double spread_deg = track.spread.sigma_rad * 180.0 / M_PI;
+    if (track.spread.sigma_m > params.max_spread_m || track.likeness.value_or(1.0) < params.min_likeness) return Hold::kNone;
+    if (static_cast<int>(track.matches.size()) >= params.min_links && spread_deg <= params.max_spread_deg) return Hold::kFirm;
+    return found.continued && spread_deg <= params.max_plain_spread_deg ? Hold::kPlain : Hold::kNone;
   }
 
-  // The less of the object is recognised, the nearer to a learned view a new one may be.
-  bool IsNewDirection(const Track& track) const {
+  // The less of the object is recognised, the nearer to a learned view a new one may be, if it is held firmly.
+  bool IsNewDirection(const Track& track, Hold hold) const {
     const Eigen::Vector3d camera = track.T_camera_object.inverse().translation();
-    const double familiar = std::clamp(track.confidence.value / params.new_view_confidence, 0.5, 1.0);
+    const double familiar = hold == Hold::kPlain ? 1.0 : std::clamp(track.confidence.value / params.new_view_confidence, 0.5, 1.0);
     const double min_angle_rad = familiar * params.min_view_angle_deg * M_PI / 180.0;
     return std::all_of(object->views.begin(), object->views.end(), [&](const model::View& view) {
       const measures::Viewpoint old = view.viewpoint();
@@ -350,13 +356,14 @@ struct Learner::Impl {
     const bool closes_loop = !pose_is_known && ClosesLoop(track);
     if (!closes_loop && track.confidence.value >= params.new_view_confidence) return "well known from here";
     if (!pose_is_known && track.probability < params.min_track_probability) return "not sure enough to learn";
-    if (!pose_is_known && !IsHeld(frame, found)) return "the pose is not held well enough to learn";
-    if (!pose_is_known && !closes_loop && !IsNewDirection(track)) return "too near to a learned view";
+    const Hold hold = HoldOf(frame, found);
+    if (!pose_is_known && hold == Hold::kNone) return "the pose is not held well enough to learn";
+    if (!pose_is_known && !closes_loop && !IsNewDirection(track, hold)) return "too near to a learned view";
     if (!Segment(frame)) return "no table plane";
     const int cluster = ClusterOfObject(clusters, *object, track.T_camera_object, frame.camera);
     if (cluster < 0) return "no cluster where the object is";
     auto extended = WithView(*object, frame, clusters[cluster].mask, track.features, track.T_camera_object, track.matches,
-                             found.continued ? 0 : params.min_view_points);
+                             hold == Hold::kPlain ? 0 : params.min_view_points);
     if (!extended) return "too few interest points with depth on the object";
     Adopt(std::move(*extended));
     return "";

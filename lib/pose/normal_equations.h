@@ -49,11 +49,11 @@ struct NormalEquations {
 };
 
 // Steps in metres and radians below which a pose has settled.
-constexpr double kSmallestStep = 1e-5;
+constexpr double kSmallestStep = 1e-6;
 
 // Holds directions in which the object could slide by a weight that is little beside any in which it could not.
 inline void HoldWhatSlides(const geometry::Rigid& T, NormalEquations* equations) {
-  constexpr double kObjectSize_m = 0.05;
+  constexpr double kObjectSize_m = 0.03;
   const double held = 1e-4 * equations->hessian.topLeftCorner<3, 3>().trace();
   // A turn is one about the object's origin, not the camera's: that would carry a plain wall along itself.
   Eigen::Matrix<double, 3, 6> of_origin;
