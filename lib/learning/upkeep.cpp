@@ -35,7 +35,8 @@ int DropFailing(const std::vector<PointStatistics>& statistics, const UpkeepPara
   return static_cast<int>(std::count(fails.begin(), fails.end(), true));
 }
 
-// Of views that crowd each other, the one with the fewest points of its own goes, until none are crowded.
+// Of two views that crowd each other, the one goes that has others nearer by, or else the one with fewer points of its own; until
+// none are crowded.
 class ViewThinning {
  public:
   ViewThinning(const UpkeepParams& params, model::ObjectModel* object) : params_(params), object_(object) {
@@ -77,9 +78,18 @@ class ViewThinning {
     return std::max(share(angle_deg, params_.redundant_angle_deg), share(octaves, params_.redundant_octaves));
   }
 
+  // To the nearest view but `pair`.
+  double Gap(int view, int pair) const {
+    double gap = std::numeric_limits<double>::infinity();
+    for (int other = 0; other < static_cast<int>(object_->views.size()); ++other) {
+      if (other != view && other != pair) gap = std::min(gap, Separation(object_->views[view], object_->views[other]));
+    }
+    return gap;
+  }
+
   bool MayGo(int view) const { return view > 0 && view + 1 < static_cast<int>(object_->views.size()); }
 
-  // The view to drop next, -1 where none is too many: of the closest pair, the one with fewer points of its own.
+  // The view to drop next, -1 where none is too many.
   int Surplus() const {
     const int count = static_cast<int>(object_->views.size());
     const double limit = count > params_.max_views ? std::numeric_limits<double>::infinity() : 1.0;
@@ -100,6 +110,10 @@ class ViewThinning {
     if (pair.first < 0) return -1;
     if (!MayGo(pair.first)) return pair.second;
     if (!MayGo(pair.second)) return pair.first;
+    constexpr double kAlike = 1.1;
+    const double gap_a = Gap(pair.first, pair.second), gap_b = Gap(pair.second, pair.first);
+    if (gap_a > kAlike * gap_b) return pair.second;
+    if (gap_b > kAlike * gap_a) return pair.first;
     return OwnPoints(object_->views[pair.first]) <= OwnPoints(object_->views[pair.second]) ? pair.first : pair.second;
   }
 

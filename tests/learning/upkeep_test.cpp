@@ -63,7 +63,7 @@ TEST(Upkeep, RedundantViewsGoButNeitherTheFirstNorTheNewest) {
   params.redundant_angle_deg = 6.0;
   UpkeepReport report;
   const model::ObjectModel kept = Kept(orbit.object(), {}, params, &report);
-  EXPECT_GE(kept.views.size(), 4u);
+  EXPECT_GE(kept.views.size(), 5u);
   EXPECT_LE(kept.views.size(), 8u);
   EXPECT_EQ(report.views_dropped, 17 - static_cast<int>(kept.views.size()));
   EXPECT_EQ(kept.views.front().id, 0);
