@@ -77,9 +77,12 @@ struct Job {
 
 Refinement Refiner::RefineAll(const std::shared_ptr<const model::ObjectModel>& object,
                               const std::map<int, pose::PosePrior>& priors) const {
+  RefinementParams thorough = params_.refinement;  // Nobody waits for it.
+  thorough.related_views *= 2;
+  thorough.surface_samples *= 2;
   Refinement result;
   result.base = object;
-  result.changed = Refined(*object, 1, params_.refinement, nullptr, Job{object, {}, {}, priors, params_}.PriorsOf(*object));
+  result.changed = Refined(*object, 1, thorough, nullptr, Job{object, {}, {}, priors, params_}.PriorsOf(*object));
   return result;
 }
 
