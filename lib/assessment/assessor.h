@@ -14,10 +14,10 @@ namespace vantage::assessment {
 
 struct TrialParams {
   int trials_per_view = 40;        // Virtual images per learned view, each offering only that view; >= 1.
-  int negatives_per_view = 10;     // Images without the object; >= 0.
+  int negatives_per_view = 10;     // Images without the object, each another background as long as there are; >= 0.
   double max_rotation_deg = 60.0;  // Out of plane, uniform in 0..max; (0, 90].
-  double max_scale_octaves = 1.0;  // log2 scale uniform in +-max: 1 = 0.5..2 times the distance; >= 0.
-  double max_image_noise = 16.0;   // Sigma, grey levels, one of 8 even levels from 0, the lower of two draws; >= 0.
+  double max_scale_octaves = 1.0;  // log2 scale within +-max, triangular about 0: 1 = 0.5..2 times the distance; >= 0.
+  double max_image_noise = 16.0;   // Sigma, grey levels, one of 8 even levels from 0, the lowest of three draws; >= 0.
   double max_blur_px = 1.6;        // Sigma, likewise; >= 0.
   double max_brightness = 0.25;    // Relative change of brightness, and of gamma; [0, 1).
   double correct_m = 0.04;         // Mean point distance below which a detection is right; > 0.
@@ -28,6 +28,12 @@ struct TrialParams {
   void Check() const;
 };
 
+// A pose the recogniser proposed.
+struct Proposal {
+  double confidence = 0.0;  // (2)
+  bool correct = false;     // Within correct_m of the truth.
+};
+
 // One virtual image and what the recogniser made of it.
 struct Trial {
   int view = 0;              // Index of the view offered.
@@ -36,15 +42,19 @@ struct Trial {
   double log2_scale = 0.0;
   double image_noise = 0.0;
   double blur_px = 0.0;
-  bool hypothesis = false;  // The recogniser proposed a pose.
-  double confidence = 0.0;  // Of the proposal; (2).
-  bool correct = false;     // The proposal is within correct_m of the truth.
+  std::vector<Proposal> proposals;  // The most likely first.
+
+  bool hypothesis() const { return !proposals.empty(); }
+  bool correct() const { return hypothesis() && proposals.front().correct; }
+  double confidence() const { return hypothesis() ? proposals.front().confidence : 0.0; }
 };
 
 // Trials for the views from `first_view` on. `backgrounds`: BGR images the object is pasted over (the run's own frames with the
-// objects masked, or photographs); plain grey noise where empty. Deterministic in (model, params, backgrounds); a view's dice do
-// not depend on first_view, but views learned later change what earlier ones look like from aside. `progress` is called after every
-// trial. Cost: about 100 ms of one core a trial, two thirds of it interest points.
+// objects masked, or photographs); plain grey noise where empty. Negatives are whole backgrounds, each once, and all views up to
+// this one are offered: it is whole models and whole images that make wrong detections. Deterministic in (model, params,
+// backgrounds); a view's dice do not depend on first_view, but views learned later change what earlier ones look like from aside.
+// `progress` is called after every trial. Cost: about 100 ms of one core a trial, two thirds of it interest points; and once those
+// of every background.
 std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, const std::vector<cv::Mat>& backgrounds,
                              const recognition::RecogniserParams& recogniser, const TrialParams& params,
                              const std::function<void(int done, int of)>& progress = {});

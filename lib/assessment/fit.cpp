@@ -12,14 +12,14 @@ measures::Measures FitMeasures(const std::vector<Trial>& trials, const recogniti
   measures::Measures measures;
   std::vector<measures::ConfidenceSample> proposals;
   for (const Trial& trial : trials) {
-    if (trial.hypothesis) proposals.push_back({trial.confidence, trial.correct});
+    for (const Proposal& proposal : trial.proposals) proposals.push_back({proposal.confidence, proposal.correct});
   }
   measures.observed = measures::ObservedSuccess::Fit(proposals, source);
 
   std::vector<measures::PredictionSample> predictions;
   for (const Trial& trial : trials) {
     if (!trial.object_shown) continue;
-    const bool detected = trial.hypothesis && trial.correct && measures.observed.Probability(trial.confidence) >= 0.5;
+    const bool detected = trial.correct() && measures.observed.Probability(trial.confidence()) >= 0.5;
     predictions.push_back({trial.rotation_rad, trial.log2_scale, detected});
   }
   measures.predicted = measures::PredictedSuccess::Fit(predictions, source);

@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -24,27 +26,27 @@ class Dice {
   std::uint32_t Bits() { return static_cast<std::uint32_t>(random_()); }
   double Uniform(double lower, double upper) { return lower + (upper - lower) * (Bits() / 4294967296.0); }
   int Index(int count) { return static_cast<int>(static_cast<std::uint64_t>(Bits()) * static_cast<std::uint64_t>(count) >> 32); }
-  // The lower of two draws: all levels come up, but most images of a working camera are good ones.
+  // The lowest of three draws: all levels come up, but most images of a working camera are good ones.
   double Level(double max) {
-    const int first = Index(kLevels), second = Index(kLevels);
-    return max * std::min(first, second) / (kLevels - 1);
+    const int first = Index(kLevels), second = Index(kLevels), third = Index(kLevels);
+    return max * std::min({first, second, third}) / (kLevels - 1);
   }
 
  private:
   std::mt19937 random_;
 };
 
-// A random window of a random background; enlarged where it is too small, grey noise where there is none.
-cv::Mat Background(const std::vector<cv::Mat>& backgrounds, const cv::Size& size, Dice* dice) {
-  if (backgrounds.empty()) {
-    cv::RNG random(dice->Bits());
-    cv::Mat coarse(size.height / 4 + 1, size.width / 4 + 1, CV_8UC1), grey, image;
-    random.fill(coarse, cv::RNG::NORMAL, 128.0, 40.0);
-    cv::resize(coarse, grey, size, 0, 0, cv::INTER_CUBIC);
-    cv::cvtColor(grey, image, cv::COLOR_GRAY2BGR);
-    return image;
-  }
-  cv::Mat image = backgrounds[static_cast<std::size_t>(dice->Index(static_cast<int>(backgrounds.size())))];
+cv::Mat GreyNoise(const cv::Size& size, Dice* dice) {
+  cv::RNG random(dice->Bits());
+  cv::Mat coarse(size.height / 4 + 1, size.width / 4 + 1, CV_8UC1), grey, image;
+  random.fill(coarse, cv::RNG::NORMAL, 128.0, 40.0);
+  cv::resize(coarse, grey, size, 0, 0, cv::INTER_CUBIC);
+  cv::cvtColor(grey, image, cv::COLOR_GRAY2BGR);
+  return image;
+}
+
+// A random window of the background, enlarged where it is too small.
+cv::Mat RandomWindow(cv::Mat image, const cv::Size& size, Dice* dice) {
   const double enlarge = std::max(size.width / static_cast<double>(image.cols), size.height / static_cast<double>(image.rows));
   if (enlarge > 1.0) {
     cv::resize(image, image,
@@ -54,12 +56,33 @@ cv::Mat Background(const std::vector<cv::Mat>& backgrounds, const cv::Size& size
   return image(cv::Rect({x, y}, size));
 }
 
+// An image virtual views are pasted over.
+struct Background {
+  cv::Mat color;
+  std::optional<features::Features> features;  // Of the whole image, once they were asked for.
+};
+
+// Where the object is farther than it was learned, each pixel is the mean of four: the texture's filter alone is softer than a
+// lens.
+VirtualImage RenderSharply(const VirtualObject& object, const geometry::PinholeCamera& camera,
+                           const geometry::Rigid& T_camera_object, bool far) {
+  if (!far) return object.Render(camera, T_camera_object);
+  VirtualImage image = object.Render(camera.Scaled(2.0), T_camera_object);
+  const cv::Size size(camera.width, camera.height);
+  cv::resize(image.color, image.color, size, 0, 0, cv::INTER_AREA);
+  cv::resize(image.mask, image.mask, size, 0, 0, cv::INTER_AREA);
+  image.mask = image.mask == 255;
+  image.color.setTo(cv::Scalar::all(0), image.mask == 0);
+  return image;
+}
+
 // Runs the trials of one view after another.
 class TrialRunner {
  public:
   TrialRunner(const model::ObjectModel& object, const std::vector<cv::Mat>& backgrounds,
               const recognition::RecogniserParams& recogniser, const TrialParams& params)
-      : object_(object), surface_(object), points_(object.PointMatrix()), backgrounds_(backgrounds), params_(params) {
+      : object_(object), surface_(object), points_(object.PointMatrix()), params_(params) {
+    for (const cv::Mat& background : backgrounds) backgrounds_.push_back({background, std::nullopt});
     recogniser_params_ = recogniser;
     recogniser_params_.use_query_depth = false;  // A virtual image is known to the recogniser by its colours only.
     recogniser_params_.min_probability = 0.0;    // Unlikely hypotheses are what is to be learned about.
@@ -67,61 +90,116 @@ class TrialRunner {
 
   void SetView(int view) {
     view_ = view;
-    recogniser_ = std::make_unique<recognition::Recogniser>(recogniser_params_);
-    recogniser_->Set(std::make_shared<model::ObjectModel>(object_.OnlyView(view)));
+    std::vector<int> so_far(static_cast<std::size_t>(view) + 1);
+    std::iota(so_far.begin(), so_far.end(), 0);
+    alone_ = RecogniserOf(object_.OnlyView(view));
+    together_ = RecogniserOf(object_.OnlyViews(so_far));
   }
 
   // The dice depend on seed, view and trial only: what was run before makes no difference.
-  Trial Run(int number, bool object_shown) {
+  Trial Run(int number) {
     Dice dice(params_.seed, view_, number);
     Trial trial;
     trial.view = view_;
-    trial.object_shown = object_shown;
     VirtualPose pose;
-    pose.rotation_rad = dice.Uniform(0.0, params_.max_rotation_deg) * M_PI / 180.0;
+    pose.rotation_rad = trial.rotation_rad = dice.Uniform(0.0, params_.max_rotation_deg) * M_PI / 180.0;
     pose.tilt_rad = dice.Uniform(0.0, 2.0 * M_PI);
     pose.roll_rad = dice.Uniform(-M_PI, M_PI);
-    pose.log2_scale = dice.Uniform(-params_.max_scale_octaves, params_.max_scale_octaves);
-    Disturbance disturbance;
-    disturbance.brightness = 1.0 + dice.Uniform(-params_.max_brightness, params_.max_brightness);
-    disturbance.gamma = 1.0 + dice.Uniform(-params_.max_brightness, params_.max_brightness);
-    disturbance.image_noise = trial.image_noise = dice.Level(params_.max_image_noise);
-    disturbance.blur_px = trial.blur_px = dice.Level(params_.max_blur_px);
+    // The mean of two: objects are mostly met at about the distance they were learned at.
+    const double scale = dice.Uniform(-params_.max_scale_octaves, params_.max_scale_octaves);
+    pose.log2_scale = trial.log2_scale = 0.5 * (scale + dice.Uniform(-params_.max_scale_octaves, params_.max_scale_octaves));
+    const Disturbance disturbance = RandomDisturbance(&dice, &trial);
 
-    const geometry::Rigid T_camera_object = VirtualCameraPose(object_.views[static_cast<std::size_t>(view_)], pose);
+    const geometry::Rigid T_camera_object = VirtualCameraPose(View(), pose);
     rgbd::Frame frame;
     // A close object may be twice the size.
     frame.camera = surface_.Window(view_, T_camera_object, 2 * params_.image_width, 2 * params_.image_height);
-    const cv::Mat background = Background(backgrounds_, cv::Size(frame.camera.width, frame.camera.height), &dice);
-    if (object_shown) {
-      trial.rotation_rad = pose.rotation_rad;
-      trial.log2_scale = pose.log2_scale;
-      frame.color = Paste(surface_.Render(frame.camera, T_camera_object), background);
-    } else {
-      frame.color = background.clone();
-    }
+    const cv::Mat window = Window(frame.camera, &dice);
+    frame.color = Paste(RenderSharply(surface_, frame.camera, T_camera_object, pose.log2_scale < 0.0), window);
     Disturb(disturbance, dice.Bits(), &frame.color);
-    Recognise(frame, T_camera_object, &trial);
+    trial.proposals = Propose(*alone_, frame, alone_->Extract(frame), T_camera_object);
     return trial;
   }
 
+  // A whole background where there is one.
+  Trial RunNegative(int number) {
+    Dice dice(params_.seed, view_, number);
+    Trial trial;
+    trial.view = view_;
+    trial.object_shown = false;
+    rgbd::Frame frame;
+    frame.camera = View().keyframe.camera;
+    frame.camera.width = 2 * params_.image_width;
+    frame.camera.height = 2 * params_.image_height;
+    features::Features features;
+    if (backgrounds_.empty()) {
+      frame.color = GreyNoise(cv::Size(frame.camera.width, frame.camera.height), &dice);
+      Disturb(RandomDisturbance(&dice, &trial), dice.Bits(), &frame.color);
+      features = together_->Extract(frame);
+    } else {
+      Background& background = backgrounds_[static_cast<std::size_t>(number) % backgrounds_.size()];
+      frame.color = background.color;
+      frame.camera.width = background.color.cols;
+      frame.camera.height = background.color.rows;
+      if (!background.features) background.features = together_->Extract(frame);
+      features = *background.features;
+    }
+    frame.camera.cx = 0.5 * frame.camera.width;
+    frame.camera.cy = 0.5 * frame.camera.height;
+    trial.proposals = Propose(*together_, frame, features, std::nullopt);
+    return trial;
+  }
+
+  // More would be the same again.
+  int Negatives() const {
+    return backgrounds_.empty() ? params_.negatives_per_view
+                                : std::min(params_.negatives_per_view, static_cast<int>(backgrounds_.size()));
+  }
+
  private:
-  void Recognise(const rgbd::Frame& frame, const geometry::Rigid& T_camera_object, Trial* trial) const {
-    const auto detections = recogniser_->Recognise(frame, recogniser_->Extract(frame));
-    if (detections.empty()) return;
-    trial->hypothesis = true;
-    trial->confidence = detections.front().confidence.value;
-    trial->correct = trial->object_shown &&
-                     model::MeanPointDistance(points_, detections.front().T_camera_object, T_camera_object) < params_.correct_m;
+  const model::View& View() const { return object_.views[static_cast<std::size_t>(view_)]; }
+
+  std::unique_ptr<recognition::Recogniser> RecogniserOf(model::ObjectModel object) const {
+    auto recogniser = std::make_unique<recognition::Recogniser>(recogniser_params_);
+    recogniser->Set(std::make_shared<model::ObjectModel>(std::move(object)));
+    return recogniser;
+  }
+
+  Disturbance RandomDisturbance(Dice* dice, Trial* trial) const {
+    Disturbance disturbance;
+    disturbance.brightness = 1.0 + dice->Uniform(-params_.max_brightness, params_.max_brightness);
+    disturbance.gamma = 1.0 + dice->Uniform(-params_.max_brightness, params_.max_brightness);
+    disturbance.image_noise = trial->image_noise = dice->Level(params_.max_image_noise);
+    disturbance.blur_px = trial->blur_px = dice->Level(params_.max_blur_px);
+    return disturbance;
+  }
+
+  cv::Mat Window(const geometry::PinholeCamera& camera, Dice* dice) const {
+    const cv::Size size(camera.width, camera.height);
+    if (backgrounds_.empty()) return GreyNoise(size, dice);
+    return RandomWindow(backgrounds_[static_cast<std::size_t>(dice->Index(static_cast<int>(backgrounds_.size())))].color, size,
+                        dice);
+  }
+
+  std::vector<Proposal> Propose(const recognition::Recogniser& recogniser, const rgbd::Frame& frame,
+                                const features::Features& features, const std::optional<geometry::Rigid>& T_camera_object) const {
+    std::vector<Proposal> proposals;
+    for (const recognition::Detection& detection : recogniser.Recognise(frame, features)) {
+      const bool correct =
+          T_camera_object && model::MeanPointDistance(points_, detection.T_camera_object, *T_camera_object) < params_.correct_m;
+      proposals.push_back({detection.confidence.value, correct});
+    }
+    return proposals;
   }
 
   const model::ObjectModel& object_;
   const VirtualObject surface_;
   const Eigen::Matrix3Xd points_;
-  const std::vector<cv::Mat>& backgrounds_;
+  std::vector<Background> backgrounds_;
   const TrialParams& params_;
   recognition::RecogniserParams recogniser_params_;
-  std::unique_ptr<recognition::Recogniser> recogniser_;
+  std::unique_ptr<recognition::Recogniser> alone_;     // The view.
+  std::unique_ptr<recognition::Recogniser> together_;  // All views up to this one.
   int view_ = 0;
 };
 
@@ -154,15 +232,15 @@ std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, c
   std::vector<Trial> trials;
   const int views = static_cast<int>(object.views.size());
   if (first_view >= views) return trials;
-  const int per_view = params.trials_per_view + params.negatives_per_view;
   TrialRunner runner(object, backgrounds, recogniser, params);
+  const int per_view = params.trials_per_view + runner.Negatives();
   for (int view = first_view; view < views; ++view) {
     const model::View& learned = object.views[static_cast<std::size_t>(view)];
     // A view without depth cannot be shown, one without points cannot be recognised.
     if (learned.points.empty() || learned.keyframe.depth.empty()) continue;
     runner.SetView(view);
     for (int i = 0; i < per_view; ++i) {
-      trials.push_back(runner.Run(i, i < params.trials_per_view));
+      trials.push_back(i < params.trials_per_view ? runner.Run(i) : runner.RunNegative(i));
       if (progress) progress(static_cast<int>(trials.size()), (views - first_view) * per_view);
     }
   }

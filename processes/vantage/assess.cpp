@@ -75,8 +75,8 @@ Json ToJson(const model::ObjectModel& object, const measures::Measures& fitted, 
   entry["completeness"] = completeness;
   entry["trials"] = trials.size();
   entry["hypotheses"] =
-      std::count_if(trials.begin(), trials.end(), [](const assessment::Trial& trial) { return trial.hypothesis; });
-  entry["correct"] = std::count_if(trials.begin(), trials.end(), [](const assessment::Trial& trial) { return trial.correct; });
+      std::count_if(trials.begin(), trials.end(), [](const assessment::Trial& trial) { return trial.hypothesis(); });
+  entry["correct"] = std::count_if(trials.begin(), trials.end(), [](const assessment::Trial& trial) { return trial.correct(); });
   entry["observed"] = std::move(observed);
   entry["predicted"] = std::move(predicted);
   return entry;

@@ -20,16 +20,14 @@ std::vector<Trial> MadeUpTrials(int count) {
     Trial trial;
     const double angle = 60.0 * (i + 0.5) / count;
     trial.rotation_rad = angle * kDegree;
-    trial.hypothesis = angle < 45.0;
-    trial.correct = angle < 30.0;
-    if (trial.hypothesis) trial.confidence = trial.correct ? right(random) : wrong(random);
+    const bool correct = angle < 30.0;
+    if (angle < 45.0) trial.proposals.push_back({correct ? right(random) : wrong(random), correct});
     trials.push_back(trial);
   }
   for (int i = 0; i < count / 4; ++i) {
     Trial trial;
     trial.object_shown = false;
-    trial.hypothesis = i % 3 == 0;
-    if (trial.hypothesis) trial.confidence = wrong(random);
+    if (i % 3 == 0) trial.proposals.push_back({wrong(random), false});
     trials.push_back(trial);
   }
   return trials;
@@ -55,9 +53,19 @@ TEST(FitMeasures, FindsWhatTheTrialsWereMadeOf) {
 TEST(FitMeasures, RightButUnbelievedIsNotDetected) {
   std::vector<Trial> trials = MadeUpTrials(800);
   for (Trial& trial : trials) {
-    if (trial.correct && trial.rotation_rad > 15.0 * kDegree) trial.confidence = 0.12;  // As low as the wrong ones.
+    if (trial.correct() && trial.rotation_rad > 15.0 * kDegree)
+      trial.proposals.front().confidence = 0.12;  // As low as the wrong ones.
   }
   EXPECT_LT(FitMeasures(trials, {}).predicted.HalfwayRotation(), 20.0 * kDegree);
+}
+
+TEST(FitMeasures, LessLikelyProposalsAreSamplesToo) {
+  std::vector<Trial> trials = MadeUpTrials(400);
+  const int before = FitMeasures(trials, {}).observed.negative().count;
+  for (int i = 0; i < 50; ++i) trials[static_cast<std::size_t>(i)].proposals.push_back({0.1, false});
+  const measures::Measures measures = FitMeasures(trials, {});
+  EXPECT_EQ(measures.observed.negative().count, before + 50);
+  EXPECT_EQ(measures.predicted.trials(), 400);
 }
 
 TEST(FitMeasures, NoTrialsGiveTheDefault) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "assessment/assessor.h"
@@ -34,7 +35,7 @@ class BoardTrials : public ::testing::Test {
 
 bool Same(const Trial& a, const Trial& b) {
   return a.view == b.view && a.object_shown == b.object_shown && a.rotation_rad == b.rotation_rad && a.log2_scale == b.log2_scale &&
-         a.hypothesis == b.hypothesis && a.confidence == b.confidence && a.correct == b.correct;
+         a.proposals.size() == b.proposals.size() && a.confidence() == b.confidence() && a.correct() == b.correct();
 }
 
 TEST_F(BoardTrials, TheBoxTeachesItsOwnMeasures) {
@@ -48,12 +49,12 @@ TEST_F(BoardTrials, TheBoxTeachesItsOwnMeasures) {
   double right_confidence = 0.0, wrong_confidence = 0.0;
   int right = 0, wrong = 0;
   for (const Trial& trial : trials) {
-    if (trial.hypothesis) (trial.correct ? right : wrong) += 1;
-    if (trial.hypothesis) (trial.correct ? right_confidence : wrong_confidence) += trial.confidence;
-    if (!trial.object_shown) without_right += trial.correct;
+    if (trial.hypothesis()) (trial.correct() ? right : wrong) += 1;
+    if (trial.hypothesis()) (trial.correct() ? right_confidence : wrong_confidence) += trial.confidence();
+    if (!trial.object_shown) without_right += trial.correct();
     if (!trial.object_shown) continue;
-    if (trial.rotation_rad < 15 * kDegree) near += 1, near_right += trial.correct;
-    if (trial.rotation_rad > 45 * kDegree) far += 1, far_right += trial.correct;
+    if (trial.rotation_rad < 15 * kDegree) near += 1, near_right += trial.correct();
+    if (trial.rotation_rad > 45 * kDegree) far += 1, far_right += trial.correct();
   }
   EXPECT_EQ(without_right, 0);
   EXPECT_GT(near_right, 0.85 * near) << near;
@@ -89,6 +90,16 @@ TEST_F(BoardTrials, AreTheSameAgainAndViewByView) {
   EXPECT_TRUE(RunTrials(object_, last_view + 1, backgrounds_, recogniser_, params).empty());
 }
 
+TEST_F(BoardTrials, NoBackgroundIsANegativeTwice) {
+  TrialParams params;
+  params.trials_per_view = 1;
+  params.negatives_per_view = 9;
+  const std::vector<Trial> trials = RunTrials(object_, 2, backgrounds_, recogniser_, params);
+  const auto negative = [](const Trial& trial) { return !trial.object_shown; };
+  EXPECT_EQ(std::count_if(trials.begin(), trials.end(), negative),
+            static_cast<long>((object_.views.size() - 2) * backgrounds_.size()));
+}
+
 TEST_F(BoardTrials, WithoutBackgroundsTheyStillRun) {
   TrialParams params;
   params.trials_per_view = 4;
@@ -96,7 +107,7 @@ TEST_F(BoardTrials, WithoutBackgroundsTheyStillRun) {
   params.max_rotation_deg = 10.0;
   params.max_image_noise = 4.0;
   int right = 0;
-  for (const Trial& trial : RunTrials(object_, 2, {}, recogniser_, params)) right += trial.correct;
+  for (const Trial& trial : RunTrials(object_, 2, {}, recogniser_, params)) right += trial.correct();
   EXPECT_GE(right, 3);
 }
 
