@@ -9,6 +9,7 @@ void AddEvaluate(CLI::App& app, Run& run) {
   CLI::App* verb = app.add_subcommand("evaluate", "Hold a part of the system against the truth");
   verb->require_subcommand(1);
   verb->set_version_flag("--version", "vantage " VANTAGE_VERSION);
+  AddEvaluateCalibration(*verb, run);
   AddEvaluateFeatures(*verb, run);
   AddEvaluateLearner(*verb, run);
   AddEvaluateRecogniser(*verb, run);

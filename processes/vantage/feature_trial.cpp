@@ -4,12 +4,10 @@
 #include <cstdio>
 #include <ctime>
 #include <memory>
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "learning/keyframe.h"
 #include "session/judge.h"
-#include "vantage/sequence.h"
+#include "vantage/known_views.h"
 
 namespace vantage::cli {
 namespace {
@@ -17,10 +15,6 @@ namespace {
 constexpr double kRight_m = 0.04, kNear_m = 0.01;  // Mean point distance.
 constexpr double kDetected = 0.5;                  // p(o|c).
 constexpr double kMinShareInImage = 0.5;
-constexpr int kMinViewPoints = 20;
-constexpr int kLabelBorder = 3;   // Pixels of the label's border that are not learned: edges against the background.
-constexpr int kSurfaceStep = 12;  // Every so manieth pixel of every so manieth row is a point of the true surface.
-const char* const kName = "object";
 
 // Milliseconds, by the clock on the wall and of the processor (all cores).
 class Timer {
@@ -32,55 +26,6 @@ class Timer {
   std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
   std::clock_t cpu_ = std::clock();
 };
-
-// What the trial knows of the recording.
-struct Recording {
-  const rgbd::BopScene& scene;
-  int object_id;
-  int label;
-
-  cv::Mat Mask(int id) const { return scene.LoadLabel(id) == label; }
-  std::optional<geometry::Rigid> Truth(int id) const { return TruthOf(scene, id, object_id); }
-};
-
-// Of all frames' labels, mesh coordinates.
-Eigen::Matrix3Xd TrueSurface(const Recording& recording, const std::vector<int>& ids) {
-  std::vector<Eigen::Vector3d> points;
-  for (const int id : ids) {
-    const auto T_camera_mesh = recording.Truth(id);
-    if (!T_camera_mesh) continue;
-    const rgbd::Frame frame = recording.scene.Load(id);
-    const cv::Mat mask = recording.Mask(id);
-    for (int y = 0; y < mask.rows && !frame.depth.empty(); y += kSurfaceStep) {
-      for (int x = 0; x < mask.cols; x += kSurfaceStep) {
-        if (mask.at<uchar>(y, x) == 0) continue;
-        if (const auto point = rgbd::PointAt(frame, {x, y})) points.push_back(T_camera_mesh->inverse() * *point);
-      }
-    }
-  }
-  if (points.empty()) {
-    throw std::runtime_error(recording.scene.folder().string() + ": no frame has depth on object " +
-                             std::to_string(recording.object_id) + "; the comparison needs a recording with depth and labels");
-  }
-  return Eigen::Map<const Eigen::Matrix3Xd>(points[0].data(), 3, static_cast<Eigen::Index>(points.size()));
-}
-
-model::ObjectModel LearnViews(const Recording& recording, const std::vector<int>& ids, const features::FeatureParams& params) {
-  model::ObjectModel object;
-  object.name = kName;
-  object.feature_fingerprint = params.Fingerprint();
-  for (const int id : ids) {
-    const auto T_camera_mesh = recording.Truth(id);
-    cv::Mat mask = recording.Mask(id);
-    cv::erode(mask, mask, cv::Mat(), cv::Point(-1, -1), kLabelBorder);
-    if (!T_camera_mesh || cv::countNonZero(mask) == 0) continue;
-    const rgbd::Frame frame = recording.scene.Load(id);
-    const features::Features features = features::Extract(rgbd::Gray(frame), mask, params);
-    auto extended = learning::WithView(object, frame, mask, features, *T_camera_mesh, {}, kMinViewPoints);
-    if (extended) object = std::move(*extended);
-  }
-  return object;
-}
 
 void JudgeFrame(const std::vector<recognition::Detection>& detections, const Eigen::Matrix3Xd& surface,
                 const std::optional<geometry::Rigid>& truth, bool visible, FeatureFigures& figures) {
@@ -132,10 +77,8 @@ FeatureSetting ParseFeatureSetting(const std::string& text) {
 std::vector<FeatureFigures> TryFeatures(const rgbd::BopScene& scene, const std::vector<int>& ids, int object_id, int folds,
                                         const std::vector<FeatureSetting>& settings,
                                         const recognition::RecogniserParams& recogniser_params) {
-  const auto label = LabelOfObject(scene, object_id);
-  if (!label) throw std::runtime_error(scene.folder().string() + ": has no label/; the comparison needs it");
-  const Recording recording{scene, object_id, *label};
-  const Eigen::Matrix3Xd surface = TrueSurface(recording, ids);
+  const KnownObject known(scene, object_id);
+  const Eigen::Matrix3Xd surface = known.Surface(ids);
   std::vector<FeatureFigures> figures(settings.size());
   for (int fold = 0; fold < folds; ++fold) {
     std::vector<int> learned, asked;
@@ -146,7 +89,7 @@ std::vector<FeatureFigures> TryFeatures(const rgbd::BopScene& scene, const std::
       params.features = settings[s].features;
       params.use_query_depth = false;
       recognisers.push_back(std::make_unique<recognition::Recogniser>(params));
-      auto object = std::make_shared<model::ObjectModel>(LearnViews(recording, learned, params.features));
+      auto object = std::make_shared<model::ObjectModel>(known.Learn(learned, params.features));
       figures[s].views += static_cast<int>(object->views.size());
       for (const model::View& view : object->views) figures[s].view_points += view.features.size();
       if (!object->views.empty()) recognisers.back()->Set(object);
@@ -155,7 +98,7 @@ std::vector<FeatureFigures> TryFeatures(const rgbd::BopScene& scene, const std::
       rgbd::Frame frame = scene.Load(id);
       frame.depth = cv::Mat();
       frame.T_world_camera.reset();
-      const auto truth = recording.Truth(id);
+      const auto truth = known.TruePose(id);
       const bool visible = truth && session::ShareInImage(surface, *truth, frame.camera) >= kMinShareInImage;
       for (std::size_t s = 0; s < settings.size(); ++s) {
         JudgeFrame(RecogniseTimed(*recognisers[s], frame, figures[s]), surface, truth, visible, figures[s]);

@@ -105,10 +105,7 @@ Json ToJson(const Tally& tally) {
 
 std::optional<TruthJudge> JudgeFor(const RecogniseOptions& options, const rgbd::BopScene& scene) {
   if (!options.truth_object_id) return std::nullopt;
-  const model::Store store(options.store, model::Store::Mode::kRead);
-  const auto objects = store.List();
-  if (objects.size() != 1) throw std::runtime_error(options.store + ": --truth-object-id needs a store of one object");
-  return TruthJudge(scene, *options.truth_object_id, *store.Load(objects[0].name));
+  return TruthJudge(scene, *options.truth_object_id, OnlyObjectOf(options.store));
 }
 
 FrameResult RecogniseFrame(const recognition::Recogniser& recogniser, rgbd::Frame frame) {

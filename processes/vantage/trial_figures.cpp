@@ -1,7 +1,6 @@
 // The figures of a learner's trial, its tables and its plot.
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <sstream>
 
@@ -259,13 +258,7 @@ void SaveTrial(const LearnerTrial& trial, const std::string& title, const fs::pa
   std::ostringstream plot;
   plot << "TITLE = " << Quoted(title) << "\nTIME(frame) = " << first_s << " + " << per_frame_s << " * frame\n" << kPlot;
   WriteWhole(folder / "plot.gnuplot", plot.str());
-  // Without gnuplot the tables and the script are there all the same.
-  std::string where = folder.string();
-  for (std::size_t at = 0; (at = where.find('\'', at)) != std::string::npos; at += 4) where.replace(at, 1, "'\\''");
-  if (std::system(("cd '" + where + "' && command -v gnuplot >/dev/null && gnuplot plot.gnuplot 2>gnuplot.log && rm -f gnuplot.log")
-                      .c_str()) != 0) {
-    return;
-  }
+  RunGnuplot(folder / "plot.gnuplot");
 }
 
 }  // namespace vantage::cli

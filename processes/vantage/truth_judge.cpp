@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "model/store.h"
 #include "session/judge.h"
 #include "vantage/sequence.h"
 
@@ -13,17 +14,34 @@ constexpr double kDetected = 0.5;  // p(o|c).
 
 }  // namespace
 
-TruthJudge::TruthJudge(const rgbd::BopScene& scene, int object_id, const model::ObjectModel& object)
-    : scene_(scene), object_id_(object_id), name_(object.name), points_(object.PointMatrix()) {
+model::ObjectModel OnlyObjectOf(const std::string& store_file) {
+  const model::Store store(store_file, model::Store::Mode::kRead);
+  const auto objects = store.List();
+  if (objects.size() != 1) {
+    throw std::runtime_error(store_file + ": expected a store of one object, it holds " + std::to_string(objects.size()));
+  }
+  auto object = store.Load(objects[0].name);
+  if (!object || object->views.empty()) throw std::runtime_error(store_file + ": '" + objects[0].name + "' has no views; learn it");
+  return std::move(*object);
+}
+
+geometry::Rigid MeshFromObject(const rgbd::BopScene& scene, int object_id, const model::ObjectModel& object) {
   const model::View& first = object.views.at(0);
   const auto T_camera_mesh = TruthOf(scene, static_cast<int>(first.frame_id), object_id);
   if (!T_camera_mesh) {
     throw std::runtime_error(scene.folder().string() + ": no truth of object " + std::to_string(object_id) + " in frame " +
-                             std::to_string(first.frame_id) + ", where " + name_ +
+                             std::to_string(first.frame_id) + ", where " + object.name +
                              " was first learned; learn it from this recording");
   }
-  T_mesh_object_ = T_camera_mesh->inverse() * first.T_camera_object;
+  return T_camera_mesh->inverse() * first.T_camera_object;
 }
+
+TruthJudge::TruthJudge(const rgbd::BopScene& scene, int object_id, const model::ObjectModel& object)
+    : scene_(scene),
+      object_id_(object_id),
+      name_(object.name),
+      points_(object.PointMatrix()),
+      T_mesh_object_(MeshFromObject(scene, object_id, object)) {}
 
 void TruthJudge::Add(const rgbd::Frame& frame, const std::vector<recognition::Detection>& detections) {
   const auto T_camera_mesh = TruthOf(scene_, static_cast<int>(frame.id), object_id_);

@@ -14,11 +14,17 @@ struct Tally {
   int wrong = 0;       // Of those, 40 mm or more from the truth.
 };
 
-// Judges the detections of one stored object that was learned from a frame of the same recording: that frame's truth ties the
-// model's coordinates to the mesh's.
+// The store's object. Throws std::runtime_error where it holds none or several.
+model::ObjectModel OnlyObjectOf(const std::string& store);
+
+// T_mesh_object of a model learned from this recording: the truth of the frame it was first learned from ties its coordinates to
+// the mesh's. Throws std::runtime_error where the recording has no truth for the object there.
+geometry::Rigid MeshFromObject(const rgbd::BopScene& scene, int object_id, const model::ObjectModel& object);
+
+// Judges the detections of one stored object that was learned from the same recording.
 class TruthJudge {
  public:
-  // Throws std::runtime_error where the recording has no truth for the object in the frame it was first learned from.
+  // Throws as MeshFromObject.
   TruthJudge(const rgbd::BopScene& scene, int object_id, const model::ObjectModel& object);
 
   void Add(const rgbd::Frame& frame, const std::vector<recognition::Detection>& detections);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <iostream>
 #include <limits>
@@ -62,6 +63,17 @@ void WriteWhole(const fs::path& file, const std::string& text) {
     fs::remove(temporary, ignored);
     throw std::runtime_error(file.string() + ": cannot be replaced: " + failed.message());
   }
+}
+
+void RunGnuplot(const fs::path& file) {
+  const auto quoted = [](std::string text) {
+    for (std::size_t at = 0; (at = text.find('\'', at)) != std::string::npos; at += 4) text.replace(at, 1, "'\\''");
+    return "'" + text + "'";
+  };
+  const std::string command = "cd " + quoted(file.parent_path().string()) + " && command -v gnuplot >/dev/null && gnuplot " +
+                              quoted(file.filename().string()) + " 2>gnuplot.log && rm -f gnuplot.log";
+  // Without the program the tables and the script are there all the same.
+  [[maybe_unused]] const int status = std::system(command.c_str());
 }
 
 void CheckOutput(const CommonOptions& options) {

@@ -34,6 +34,7 @@ void AddExplore(CLI::App& app, Run& run);
 void AddModels(CLI::App& app, Run& run);
 void AddEvaluate(CLI::App& app, Run& run);
 // The parts of `evaluate`.
+void AddEvaluateCalibration(CLI::App& evaluate, Run& run);
 void AddEvaluateFeatures(CLI::App& evaluate, Run& run);
 void AddEvaluateLearner(CLI::App& evaluate, Run& run);
 void AddEvaluateRecogniser(CLI::App& evaluate, Run& run);
@@ -51,6 +52,10 @@ void CheckWritable(const std::filesystem::path& file);
 
 // Writes under another name, then renames: the file is whole or as it was.
 void WriteWhole(const std::filesystem::path& file, const std::string& text);
+
+// Runs `file`, a gnuplot script, in its folder; nothing where that program is not found. What gnuplot complains of stays in
+// gnuplot.log beside it.
+void RunGnuplot(const std::filesystem::path& file);
 
 // Checks that --json can be written; called before the work.
 void CheckOutput(const CommonOptions& options);

@@ -1,0 +1,62 @@
+// Measures held against frames with truth from which nothing was learned.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "model/object_model.h"
+#include "recognition/recogniser.h"
+
+namespace vantage::assessment {
+
+struct HeldOutFrame {
+  rgbd::Frame frame;  // Without depth, should that have been rendered at the true pose.
+  features::Features features;
+  std::optional<geometry::Rigid> T_camera_mesh;  // True pose; nullopt where the object is not there.
+  bool counts = false;                           // Enough of the object is in the image: it should be detected.
+};
+
+// What hypotheses are held against.
+struct Truth {
+  Eigen::Matrix3Xd points_in_mesh;  // The true surface, metres.
+  geometry::Rigid T_mesh_object = geometry::Rigid::Identity();
+  double correct_m = 0.04;  // Mean point distance below which a hypothesis is right.
+
+  bool IsRight(const geometry::Rigid& T_camera_object, const HeldOutFrame& frame) const;
+};
+
+// A pose the recogniser proposed, however unlikely.
+struct HeldOutHypothesis {
+  int frame = 0;  // Index.
+  double confidence = 0.0;
+  bool right = false;
+};
+
+// One frame and what a single learned view, offered alone, made of it.
+struct ViewTrial {
+  int view = 0;   // Index.
+  int frame = 0;  // Index.
+  double rotation_rad = 0.0;
+  double log2_scale = 0.0;
+  bool right = false;       // The most likely hypothesis is right.
+  double confidence = 0.0;  // Its confidence.
+};
+
+// Every hypothesis about the object in every frame, by frame, the most likely first. Cost: the recogniser's, once a frame, without
+// extraction; all cores.
+std::vector<HeldOutHypothesis> Hypotheses(const std::shared_ptr<const model::ObjectModel>& object, const Truth& truth,
+                                          const std::vector<HeldOutFrame>& frames, const recognition::RecogniserParams& recogniser);
+
+// Every view with every frame that counts and lies less than 90 degrees from it, by view. All cores.
+std::vector<ViewTrial> TryViewsAlone(const model::ObjectModel& object, const Truth& truth, const std::vector<HeldOutFrame>& frames,
+                                     const recognition::RecogniserParams& recogniser);
+
+// Share of the frames that count in which the most likely hypothesis is right and has p(o|c) >= 1/2.
+double DetectionRate(const std::vector<HeldOutHypothesis>& hypotheses, const std::vector<HeldOutFrame>& frames,
+                     const measures::ObservedSuccess& observed);
+
+// From where the frames that count show the object, each with weight 1: the p(theta) of these frames.
+std::vector<measures::WeightedViewpoint> ViewpointsOf(const std::vector<HeldOutFrame>& frames, const Truth& truth);
+
+}  // namespace vantage::assessment

@@ -1,0 +1,236 @@
+#include "vantage/calibration_trial.h"
+
+#include <algorithm>
+#include <mutex>
+#include <numeric>
+#include <opencv2/core/utility.hpp>
+#include <random>
+
+#include "assessment/background.h"
+#include "model/store.h"
+#include "session/judge.h"
+#include "vantage/known_views.h"
+#include "vantage/sequence.h"
+#include "vantage/truth_judge.h"
+
+namespace vantage::cli {
+namespace {
+
+constexpr double kMinShareInImage = 0.5;
+constexpr int kMaxBackgrounds = 8;  // As the assessor keeps.
+constexpr int kMinTrialsPerView = 8;
+
+// `count` of 0..of-1, ascending.
+std::vector<int> Draw(int count, int of, std::mt19937* random) {
+  std::vector<int> all(static_cast<std::size_t>(of));
+  std::iota(all.begin(), all.end(), 0);
+  for (int i = 0; i < count; ++i) {
+    const auto other = static_cast<std::uint64_t>((*random)()) * static_cast<std::uint64_t>(of - i) >> 32;
+    std::swap(all[static_cast<std::size_t>(i)], all[static_cast<std::size_t>(i) + other]);
+  }
+  all.resize(static_cast<std::size_t>(count));
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+// What every model of one run shares.
+class Field {
+ public:
+  Field(const CalibrationOptions& options, const params::LibraryParams& params)
+      : options_(options), params_(params), scene_(options.folder), known_(scene_, options.object_id) {
+    const std::vector<int> even = FramesOf(scene_, "even");
+    for (std::size_t i = 0; i < even.size(); ++i) {
+      (options.tune && i % 2 == 1 ? judged_ids_ : learned_ids_).push_back(even[i]);
+    }
+    if (!options.tune) judged_ids_ = FramesOf(scene_, "odd");
+    truth_.points_in_mesh = known_.Surface(learned_ids_);
+    truth_.correct_m = params.trials.correct_m;
+    // As the learner has it: the object's frame is in its middle.
+    truth_.T_mesh_object.translation() = truth_.points_in_mesh.rowwise().mean();
+  }
+
+  const assessment::Truth& truth() const { return truth_; }
+  assessment::Truth* mutable_truth() { return &truth_; }
+  const rgbd::BopScene& scene() const { return scene_; }
+
+  model::ObjectModel Learn() const { return known_.Learn(learned_ids_, params_.recogniser.features, truth_.T_mesh_object); }
+
+  // Frames that judge, then those without the object.
+  std::vector<assessment::HeldOutFrame> HeldOut() const {
+    std::vector<assessment::HeldOutFrame> frames;
+    for (const int id : judged_ids_) frames.push_back(Load(scene_, id, known_.TruePose(id)));
+    for (const std::string& folder : options_.absent) {
+      const rgbd::BopScene absent(folder);
+      for (std::size_t i = 0; i < absent.ids().size(); i += static_cast<std::size_t>(options_.absent_step)) {
+        frames.push_back(Load(absent, absent.ids()[i], std::nullopt));
+      }
+    }
+    const recognition::Recogniser recogniser(params_.recogniser);
+    cv::parallel_for_(cv::Range(0, static_cast<int>(frames.size())), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) {
+        auto& [frame, features, T_camera_mesh, counts] = frames[static_cast<std::size_t>(i)];
+        features = recogniser.Extract(frame);
+        frame.color = cv::Mat();
+      }
+    });
+    return frames;
+  }
+
+  // Throws std::runtime_error where a view was learned from a frame that judges.
+  void CheckUnseen(const model::ObjectModel& object) const {
+    for (const model::View& view : object.views) {
+      if (!std::binary_search(judged_ids_.begin(), judged_ids_.end(), static_cast<int>(view.frame_id))) continue;
+      throw std::runtime_error(options_.store + ": '" + object.name + "' was learned from frame " + std::to_string(view.frame_id) +
+                               ", which judges; learn it with --frames even");
+    }
+  }
+
+  // Frames to learn from with the object masked, as the assessor keeps them of its run.
+  std::vector<cv::Mat> Backgrounds(std::mt19937* random) const {
+    const int count = std::min(kMaxBackgrounds, static_cast<int>(learned_ids_.size()));
+    std::vector<cv::Mat> images;
+    for (const int i : Draw(count, static_cast<int>(learned_ids_.size()), random)) {
+      const int id = learned_ids_[static_cast<std::size_t>(i)];
+      images.push_back(assessment::MaskedBackground(scene_.Load(id).color, known_.Mask(id)));
+    }
+    return images;
+  }
+
+ private:
+  assessment::HeldOutFrame Load(const rgbd::BopScene& scene, int id, const std::optional<geometry::Rigid>& T_camera_mesh) const {
+    assessment::HeldOutFrame held_out;
+    held_out.frame = scene.Load(id);
+    held_out.frame.depth = cv::Mat();
+    held_out.frame.T_world_camera.reset();
+    held_out.T_camera_mesh = T_camera_mesh;
+    held_out.counts =
+        T_camera_mesh && session::ShareInImage(truth_.points_in_mesh, *T_camera_mesh, held_out.frame.camera) >= kMinShareInImage;
+    return held_out;
+  }
+
+  const CalibrationOptions& options_;
+  const params::LibraryParams& params_;
+  rgbd::BopScene scene_;
+  KnownObject known_;
+  std::vector<int> learned_ids_, judged_ids_;
+  assessment::Truth truth_;
+};
+
+// The trials of all views, `max_trials` at most.
+assessment::TrialParams TrialsFor(assessment::TrialParams params, int views, int max_trials) {
+  const int wanted = params.trials_per_view;
+  params.trials_per_view = std::clamp(max_trials / views, std::min(wanted, kMinTrialsPerView), wanted);
+  return params;
+}
+
+void Judge(const model::ObjectModel& object, const Field& field, const std::vector<assessment::HeldOutFrame>& frames,
+           const params::LibraryParams& params, JudgedModel* judged) {
+  judged->measures = object.measures;
+  judged->hypotheses =
+      assessment::Hypotheses(std::make_shared<const model::ObjectModel>(object), field.truth(), frames, params.recogniser);
+  judged->detection_rate = assessment::DetectionRate(judged->hypotheses, frames, object.measures.observed);
+  const auto viewpoints = assessment::ViewpointsOf(frames, field.truth());
+  for (std::size_t i = 0; i < kCompletenessRules.size(); ++i) {
+    judged->completeness[i] =
+        measures::Completeness(object.viewpoints(), viewpoints, object.measures.predicted, kCompletenessRules[i]);
+  }
+}
+
+// Models drawn from all learned views, assessed by virtual views alone and judged.
+class DrawnModels {
+ public:
+  DrawnModels(const CalibrationOptions& options, const params::LibraryParams& params, const Field& field,
+              const std::vector<assessment::HeldOutFrame>& frames)
+      : options_(options), params_(params), field_(field), frames_(frames), all_(field.Learn()) {
+    const int largest = *std::max_element(options.views.begin(), options.views.end());
+    if (static_cast<int>(all_.views.size()) < largest) {
+      throw std::runtime_error(options.folder + ": --views " + std::to_string(largest) + " asks for more views than the " +
+                               std::to_string(all_.views.size()) + " frames to learn from show");
+    }
+    alone_ = assessment::TryViewsAlone(all_, field.truth(), frames, params.recogniser);
+    std::mt19937 random(options.seed);
+    for (const int views : options.views) {
+      for (int draw = 0; draw < options.draws; ++draw) {
+        chosen_.push_back(Draw(views, static_cast<int>(all_.views.size()), &random));
+        judged_.emplace_back();
+        judged_.back().views = views;
+        judged_.back().draw = draw;
+      }
+    }
+  }
+
+  std::vector<JudgedModel> Run(const std::function<void(int done, int of)>& progress) {
+    std::mutex mutex;
+    int done = 0;
+    const int count = static_cast<int>(judged_.size());
+    cv::parallel_for_(
+        cv::Range(0, count),
+        [&](const cv::Range& range) {
+          for (int i = range.end - 1; i >= range.start; --i) {
+            RunOne(static_cast<std::size_t>(i));
+            const std::lock_guard<std::mutex> lock(mutex);
+            if (progress) progress(++done, count);
+          }
+        },
+        count);
+    return std::move(judged_);
+  }
+
+ private:
+  void RunOne(std::size_t i) {
+    JudgedModel& judged = judged_[i];
+    model::ObjectModel object = all_.OnlyViews(chosen_[i]);
+    assessment::TrialParams trials = TrialsFor(params_.trials, judged.views, options_.max_trials);
+    trials.seed = options_.seed + static_cast<std::uint32_t>(i);
+    std::mt19937 random(trials.seed);
+    judged.trials = assessment::RunTrials(object, 0, field_.Backgrounds(&random), params_.recogniser, trials);
+    object.measures = assessment::FitMeasures(judged.trials, params_.recogniser);
+    for (const assessment::ViewTrial& trial : alone_) {
+      if (std::binary_search(chosen_[i].begin(), chosen_[i].end(), trial.view)) judged.view_trials.push_back(trial);
+    }
+    Judge(object, field_, frames_, params_, &judged);
+  }
+
+  const CalibrationOptions& options_;
+  const params::LibraryParams& params_;
+  const Field& field_;
+  const std::vector<assessment::HeldOutFrame>& frames_;
+  model::ObjectModel all_;
+  std::vector<assessment::ViewTrial> alone_;
+  std::vector<std::vector<int>> chosen_;  // View indices of every model.
+  std::vector<JudgedModel> judged_;
+};
+
+JudgedModel JudgeStored(const CalibrationOptions& options, const params::LibraryParams& params, Field& field,
+                        const std::vector<assessment::HeldOutFrame>& frames) {
+  const model::ObjectModel object = OnlyObjectOf(options.store);
+  if (object.measures.fingerprint != params.recogniser.Fingerprint()) {
+    throw std::runtime_error(options.store + ": the measures of '" + object.name + "' are " +
+                             (object.measures.fingerprint.empty() ? "not learned yet" : "of other recogniser settings") +
+                             "; run vantage assess with this --config");
+  }
+  field.CheckUnseen(object);
+  field.mutable_truth()->T_mesh_object = MeshFromObject(field.scene(), options.object_id, object);
+  JudgedModel judged;
+  judged.views = static_cast<int>(object.views.size());
+  judged.view_trials = assessment::TryViewsAlone(object, field.truth(), frames, params.recogniser);
+  Judge(object, field, frames, params, &judged);
+  return judged;
+}
+
+}  // namespace
+
+CalibrationTrial TryCalibration(const CalibrationOptions& options, const params::LibraryParams& params,
+                                const std::function<void(int done, int of)>& progress) {
+  Field field(options, params);
+  CalibrationTrial trial;
+  trial.frames = field.HeldOut();
+  if (!options.store.empty()) {
+    trial.models.push_back(JudgeStored(options, params, field, trial.frames));
+  } else {
+    trial.models = DrawnModels(options, params, field, trial.frames).Run(progress);
+  }
+  return trial;
+}
+
+}  // namespace vantage::cli

@@ -1,0 +1,83 @@
+// vantage evaluate calibration: whether probabilities learned from virtual views hold in frames nothing was learned from.
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+#include "vantage/calibration_trial.h"
+
+namespace vantage::cli {
+namespace {
+
+struct Options {
+  CommonOptions common;
+  CalibrationOptions trial;
+  bool quick = false;
+  std::string out;
+};
+
+void RunEvaluateCalibration(const Options& options) {
+  CheckOutput(options.common);
+  params::LibraryParams params = LoadParams(options.common);
+  CalibrationOptions trial_options = options.trial;
+  trial_options.seed = options.common.seed;
+  if (options.quick) {
+    trial_options.views = {2, 8};
+    trial_options.draws = 2;
+    trial_options.max_trials = 48;
+    trial_options.absent_step = 4;
+  }
+  const CalibrationTrial trial = TryCalibration(trial_options, params, [](int done, int of) {
+    std::cerr << "\r" << done << " of " << of << " models" << (done == of ? "\n" : "") << std::flush;
+  });
+  Json figures = FiguresOf(trial, trial_options.seed);
+  figures["seed"] = trial_options.seed;
+  if (!options.out.empty()) SaveCalibration(trial, figures, options.out);
+  WriteResult(options.common, figures, TableOf(figures));
+}
+
+}  // namespace
+
+void AddEvaluateCalibration(CLI::App& evaluate, Run& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* verb = evaluate.add_subcommand(
+      "calibration", "Measures learned from virtual views alone, held against frames of a recording that nothing was learned from");
+  AddCommonOptions(*verb, options->common);
+  verb->add_option("--sequence", options->trial.folder,
+                   "BOP scene folder with depth, labels and truth: even ids teach, odd ids judge")
+      ->required()
+      ->type_name("DIR");
+  verb->add_option("--object-id", options->trial.object_id, "The object of scene_gt.json that is learned and looked for")
+      ->required()
+      ->check(CLI::Range(1, 1000000))
+      ->type_name("N");
+  CLI::Option* store =
+      verb->add_option("--store", options->trial.store,
+                       "Judge the measures stored with this store's one object, learned from even ids (default: models are drawn)")
+          ->type_name("FILE");
+  verb->add_option("--views", options->trial.views, "Views of the models that are drawn")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str()
+      ->excludes(store);
+  verb->add_option("--draws", options->trial.draws, "Models for each number of views")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str()
+      ->excludes(store);
+  verb->add_option("--max-trials", options->trial.max_trials,
+                   "Virtual images with the object for each model, at most trials_per_view for each view")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str()
+      ->excludes(store);
+  verb->add_option("--absent", options->trial.absent, "Recordings that do not show the object: every hypothesis there is wrong")
+      ->delimiter(',')
+      ->type_name("DIR[,...]");
+  verb->add_flag("--tune", options->trial.tune,
+                 "For choosing parameters: of the even ids every other one teaches and the rest judge; odd ids are not looked at");
+  verb->add_flag("--quick", options->quick, "2 models each of 2 and 8 views, few virtual images");
+  verb->add_option(
+          "--out", options->out,
+          "Write figures.json, hypotheses.csv, views.csv, trials.csv, models.csv and reliability.png (where gnuplot is found)")
+      ->type_name("DIR");
+  verb->callback([options, &run] { run = [options] { RunEvaluateCalibration(*options); }; });
+}
+
+}  // namespace vantage::cli
