@@ -118,10 +118,14 @@ struct Pair {
 };
 using Pairs = std::set<Pair>;
 
-// Free views and the ones learned just before them, whose places to each other tracking has just seen.
+constexpr double kBeside_rad = 25.0 * M_PI / 180.0;  // Views that show much of the same, whether they share points or not.
+
+// Free views and the ones learned just before them beside them, whose places to each other tracking has just seen.
 Pairs PairsInARow(const model::ObjectModel& object, int first_free_view) {
   Pairs pairs;
   for (int v = first_free_view; v < static_cast<int>(object.views.size()); ++v) {
+    if (geometry::AngleBetween(object.views[v - 1].viewpoint().direction, object.views[v].viewpoint().direction) > kBeside_rad)
+      continue;
     pairs.insert({v - 1, v});
     pairs.insert({v, v - 1});
   }
@@ -132,14 +136,14 @@ Pairs PairsInARow(const model::ObjectModel& object, int first_free_view) {
 // beside them that share too few. Both ways, since each sees the other's appearance where it is seen best; where depth must not
 // place a view, older ones' against newer images only.
 Pairs PairsToRelate(const model::ObjectModel& object, int first_free_view, const RefinementParams& params) {
-  constexpr double kMaxAngle_rad = 25.0 * M_PI / 180.0;  // Of views that share too few points.
   const int count = static_cast<int>(object.views.size());
   Pairs pairs;
   for (int v = first_free_view; v < count; ++v) {
     const std::vector<Kin> kin = ByKinship(object, v, count);
     for (int i = 0; i < std::min(params.related_views, static_cast<int>(kin.size())); ++i) {
-      const bool is_linked = kin[i].shared >= params.min_shared_points || (params.use_depth && std::abs(v - kin[i].view) <= 2);
-      if (!is_linked && (!params.use_depth || kin[i].angle_rad > kMaxAngle_rad)) continue;
+      const bool share_points = kin[i].shared >= params.min_shared_points;
+      if (!share_points && (!params.use_depth || kin[i].angle_rad > kBeside_rad)) continue;
+      const bool is_linked = share_points || std::abs(v - kin[i].view) <= 2;
       pairs.insert({std::min(v, kin[i].view), std::max(v, kin[i].view), is_linked});
       if (params.use_depth) pairs.insert({std::max(v, kin[i].view), std::min(v, kin[i].view), is_linked});
     }
