@@ -5,6 +5,7 @@
 #include <random>
 
 #include "rgbd/bop.h"
+#include "segmentation/overlap.h"
 #include "segmentation/clusters.h"
 #include "segmentation/plane.h"
 #include "support/data.h"
@@ -81,21 +82,6 @@ class Tabletop {
   cv::Mat labels_;
   int boxes_ = 0;
 };
-
-double IntersectionOverUnion(const cv::Mat& a, const cv::Mat& b) {
-  return cv::countNonZero(a & b) / static_cast<double>(std::max(1, cv::countNonZero(a | b)));
-}
-
-double BestOverlap(const std::vector<Cluster>& clusters, const cv::Mat& mask) {
-  double best = 0.0;
-  for (const Cluster& cluster : clusters) best = std::max(best, IntersectionOverUnion(cluster.mask, mask));
-  return best;
-}
-
-std::vector<Cluster> Segment(const Frame& frame, const ClusterParams& params = {}) {
-  const std::optional<Plane> plane = FitPlane(frame, {});
-  return plane ? FindClusters(frame, *plane, params) : std::vector<Cluster>{};
-}
 
 TEST(Plane, OfANoisyTableIsRightToAMillimetreAndFacesTheCamera) {
   Tabletop table;

@@ -7,8 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "segmentation/clusters.h"
-#include "segmentation/plane.h"
+#include "segmentation/overlap.h"
 #include "simulation/simulated_world.h"
 #include "simulation/small_world.h"
 #include "support/data.h"
@@ -20,26 +19,11 @@ using Eigen::Vector3d;
 using simulation::SimulatedWorld;
 using simulation::WorldParams;
 
-double IntersectionOverUnion(const cv::Mat& a, const cv::Mat& b) {
-  return cv::countNonZero(a & b) / static_cast<double>(std::max(1, cv::countNonZero(a | b)));
-}
-
-double BestOverlap(const std::vector<Cluster>& clusters, const cv::Mat& mask) {
-  double best = 0.0;
-  for (const Cluster& cluster : clusters) best = std::max(best, IntersectionOverUnion(cluster.mask, mask));
-  return best;
-}
-
 // Clusters that have most of their pixels on objects: what else a room holds is not meant.
 int ClustersOn(const std::vector<Cluster>& clusters, const cv::Mat& objects) {
   int count = 0;
   for (const Cluster& cluster : clusters) count += 2 * cv::countNonZero(cluster.mask & objects) > cv::countNonZero(cluster.mask);
   return count;
-}
-
-std::vector<Cluster> Segment(const rgbd::Frame& frame, const ClusterParams& params = {}) {
-  const std::optional<Plane> plane = FitPlane(frame, {});
-  return plane ? FindClusters(frame, *plane, params) : std::vector<Cluster>{};
 }
 
 // A camera that looks at a point 0.06 m above the table's middle, rolled about its axis.
