@@ -96,8 +96,8 @@ class Cli : public ::testing::Test {
 
 TEST_F(Cli, HelpAndVersionOfEveryVerb) {
   for (const char* verb :
-       {"", "learn", "recognise", "assess", "explore", "evaluate features", "evaluate learner", "evaluate recogniser",
-        "evaluate segmentation", "models list", "models show", "vocabulary train", "vocabulary show"}) {
+       {"", "learn", "recognise", "assess", "explore", "evaluate calibration", "evaluate features", "evaluate learner",
+        "evaluate recogniser", "evaluate segmentation", "models list", "models show", "vocabulary train", "vocabulary show"}) {
     SCOPED_TRACE(verb);
     const Outcome help = Run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
@@ -129,6 +129,10 @@ TEST_F(Cli, MisuseIsOneLine) {
   ExpectRefused("explore --sequence a", "vantage explore", {"--object-id"});
   ExpectRefused("explore --world w.yaml --strategy best", "vantage explore", {"best"});
   ExpectRefused("evaluate", "vantage evaluate", {});
+  ExpectRefused("evaluate calibration", "vantage evaluate calibration", {"--sequence"});
+  ExpectRefused("evaluate calibration --sequence gone --object-id 3", "vantage evaluate calibration", {"gone"});
+  ExpectRefused("evaluate calibration --sequence a --object-id 3 --store b --draws 2", "vantage evaluate calibration",
+                {"--draws", "--store"});
   ExpectRefused("evaluate features --sequence gone --object-id 3", "vantage evaluate features", {"gone"});
   ExpectRefused("evaluate features --sequence gone --object-id 3 --features sift:3000", "vantage evaluate features",
                 {"TYPE:MAX_KEYPOINTS:CONTRAST", "sift:3000"});
