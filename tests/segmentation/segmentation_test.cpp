@@ -5,8 +5,8 @@
 #include <random>
 
 #include "rgbd/bop.h"
-#include "segmentation/overlap.h"
 #include "segmentation/clusters.h"
+#include "segmentation/overlap.h"
 #include "segmentation/plane.h"
 #include "support/data.h"
 
