@@ -11,6 +11,7 @@
 #include "learning/mount_witness.h"
 #include "learning/refiner.h"
 #include "learning/tracker.h"
+#include "learning/view_choice.h"
 
 namespace vantage::learning {
 namespace {
@@ -310,60 +311,17 @@ struct Learner::Impl {
 
   // --- New views ---
 
-  // How well a pose must be held to be learned from.
-  enum class Hold {
-    kNone,
-    kPlain,  // Followed to where the surface shows, less well than is wanted: enough not to lose a plain object.
-    kFirm,
-  };
-  Hold HoldOf(const rgbd::Frame& frame, const Found& found) const {
-    const Track& track = found.track;
-    if (mount.Agrees(frame, track.T_camera_object)) return Hold::kFirm;
-    const double spread_deg = track.spread.sigma_rad * 180.0 / M_PI;
-    if (track.spread.sigma_m > params.max_spread_m || track.likeness.value_or(1.0) < params.min_likeness) return Hold::kNone;
-    if (static_cast<int>(track.matches.size()) >= params.min_links && spread_deg <= params.max_spread_deg) return Hold::kFirm;
-    return found.continued && spread_deg <= params.max_plain_spread_deg ? Hold::kPlain : Hold::kNone;
-  }
-
-  // The less of the object is recognised, the nearer to a learned view a new one may be, if it is held firmly.
-  bool IsNewDirection(const Track& track, Hold hold) const {
-    const Eigen::Vector3d camera = track.T_camera_object.inverse().translation();
-    const double familiar = hold == Hold::kPlain ? 1.0 : std::clamp(track.confidence.value / params.new_view_confidence, 0.5, 1.0);
-    const double min_angle_rad = familiar * params.min_view_angle_deg * M_PI / 180.0;
-    return std::all_of(object->views.begin(), object->views.end(), [&](const model::View& view) {
-      const measures::Viewpoint old = view.viewpoint();
-      return geometry::AngleBetween(camera, old.direction) > min_angle_rad ||
-             std::abs(std::log2(camera.norm() / old.distance_m)) > 1.0 / 3.0;
-    });
-  }
-
-  // Whether the frame shows both what was learned last and, without the model knowing that they meet, something learned long
-  // before: a view of it ties them together.
-  bool ClosesLoop(const Track& track) const {
-    constexpr double kMaxAngle_rad = 25.0 * M_PI / 180.0;
-    const int newest = static_cast<int>(object->views.size()) - 1;
-    const int seen = track.confidence.view;
-    if (seen < 0 || newest - seen <= params.loop_closure.min_views_between) return false;
-    if (static_cast<int>(track.matches.size()) < params.min_links) return false;
-    const geometry::Rigid T_object_camera = track.T_camera_object.inverse();
-    return geometry::AngleBetween(T_object_camera.translation(), object->views[newest].viewpoint().direction) < kMaxAngle_rad &&
-           SharedPoints(object->views[newest], object->views[seen]) < params.refinement.min_shared_points;
-  }
-
   // Empty where a view was added, else why not.
   std::string AddView(const rgbd::Frame& frame, const Found& found, bool pose_is_known) {
     const Track& track = found.track;
-    const bool closes_loop = !pose_is_known && ClosesLoop(track);
-    if (!closes_loop && track.confidence.value >= params.new_view_confidence) return "well known from here";
-    if (!pose_is_known && track.probability < params.min_track_probability) return "not sure enough to learn";
-    const Hold hold = HoldOf(frame, found);
-    if (!pose_is_known && hold == Hold::kNone) return "the pose is not held well enough to learn";
-    if (!pose_is_known && !closes_loop && !IsNewDirection(track, hold)) return "too near to a learned view";
+    const Sighting sighting{track, found.continued, mount.Agrees(frame, track.T_camera_object), pose_is_known};
+    const ViewChoice choice = ChooseView(*object, sighting, params);
+    if (!choice.refusal.empty()) return choice.refusal;
     if (!Segment(frame)) return "no table plane";
     const int cluster = ClusterOfObject(clusters, *object, track.T_camera_object, frame.camera);
     if (cluster < 0) return "no cluster where the object is";
-    auto extended = WithView(*object, frame, clusters[cluster].mask, track.features, track.T_camera_object, track.matches,
-                             hold == Hold::kPlain ? 0 : params.min_view_points);
+    auto extended =
+        WithView(*object, frame, clusters[cluster].mask, track.features, track.T_camera_object, track.matches, choice.min_points);
     if (!extended) return "too few interest points with depth on the object";
     Adopt(std::move(*extended));
     return "";
