@@ -102,6 +102,7 @@ void Bus::ThrowUnencodable(const std::string& channel) {
 }
 
 bool Bus::PublishRaw(const std::string& channel, const void* data, std::size_t size) {
+  if (tap_) tap_(channel, data, size);
   if (lcm_publish(lcm_, channel.c_str(), data, static_cast<unsigned int>(size)) == 0) return true;
   ++publish_failures_;
   return false;

@@ -53,7 +53,8 @@ class Bus {
         channel,
         [handler = std::move(handler)](const void* data, std::uint32_t size) {
           Message message;
-          if (!PlausibleBytes<Message>(data, size) || message.decode(data, 0, static_cast<int>(size)) < 0) return false;
+          const int bytes = static_cast<int>(size);
+          if (!PlausibleBytes<Message>(data, size) || message.decode(data, 0, bytes) != bytes) return false;
           handler(message);
           return true;
         },
@@ -69,6 +70,9 @@ class Bus {
     return PublishRaw(channel, bytes.data(), bytes.size());
   }
   bool PublishRaw(const std::string& channel, const void* data, std::size_t size);
+  // Hears everything that is published here, before it is sent, in order; empty: nobody does.
+  using Tap = std::function<void(const std::string& channel, const void* data, std::size_t size)>;
+  void SetTap(Tap tap) { tap_ = std::move(tap); }
   std::int64_t publish_failures() const { return publish_failures_; }
 
   enum class Handled { kMessage, kNothing, kEnd };  // kEnd: the log has ended or the connection is broken.
@@ -89,6 +93,7 @@ class Bus {
 
   std::string url_;
   Clock clock_;
+  Tap tap_;
   lcm_t* lcm_ = nullptr;
   std::vector<std::unique_ptr<Subscription>> subscriptions_;
   std::int64_t publish_failures_ = 0;

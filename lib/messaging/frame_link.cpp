@@ -23,18 +23,6 @@ bool SameImage(const image_part_t& a, const image_part_t& b) {
          a.camera.width == b.camera.width && a.camera.height == b.camera.height;
 }
 
-std::string WhyNotAPart(const image_part_t& part) {
-  if (part.utime <= 0) return "an image without a capture time";
-  if (part.total_size < 1 || part.total_size > kMaxEncodedImageBytes) {
-    return "an image of " + std::to_string(part.total_size) + " bytes";
-  }
-  if (part.parts < 1 || part.part < 0 || part.part >= part.parts || part.size < 1 || part.size > part.total_size) {
-    return "part " + std::to_string(part.part) + " of " + std::to_string(part.parts) + " with " + std::to_string(part.size) +
-           " bytes";
-  }
-  return "";
-}
-
 template <typename Map>
 void Limit(Map& map) {
   while (map.size() > kMaxPending) map.erase(map.begin());
@@ -75,6 +63,18 @@ bool PlausibleBytes<image_part_t>(const void* data, std::uint32_t size) {
   }());
   if (size < header_size) return false;
   return BigEndian32(static_cast<const unsigned char*>(data) + header_size - 4) == size - header_size;
+}
+
+std::string WhyNotAPart(const image_part_t& part) {
+  if (part.utime <= 0) return "an image without a capture time";
+  if (part.total_size < 1 || part.total_size > kMaxEncodedImageBytes) {
+    return "an image of " + std::to_string(part.total_size) + " bytes";
+  }
+  if (part.parts < 1 || part.part < 0 || part.part >= part.parts || part.size < 1 || part.size > part.total_size) {
+    return "part " + std::to_string(part.part) + " of " + std::to_string(part.parts) + " with " + std::to_string(part.size) +
+           " bytes";
+  }
+  return "";
 }
 
 void FrameSenderParams::Check() const {
@@ -232,14 +232,14 @@ void FrameReceiver::Complete(EncodedFrame frame) {
 
 std::optional<ReceivedFrame> FrameReceiver::Take() {
   if (!newest_) return std::nullopt;
-  const EncodedFrame encoded = std::move(*newest_);
+  EncodedFrame encoded = std::move(*newest_);
   newest_.reset();
   auto frame = Decode(encoded.color, encoded.depth);
   if (!frame) {
     Refuse(std::string(kSensorColor) + ": frame " + std::to_string(encoded.color.header.sequence) + ": " + frame.error);
     return std::nullopt;
   }
-  return ReceivedFrame{std::move(*frame), encoded.color.header.sequence};
+  return ReceivedFrame{std::move(*frame), encoded.color.header.sequence, std::move(encoded.color.bytes)};
 }
 
 std::int64_t FrameReceiver::bad() const { return refused_ + color_counts_->bad + depth_counts_->bad; }

@@ -19,6 +19,9 @@ bool PlausibleBytes<image_part_t>(const void* data, std::uint32_t size);
 
 inline constexpr int kMaxEncodedImageBytes = 32 << 20;
 
+// What contradicts itself in one part of an image; empty where nothing does.
+std::string WhyNotAPart(const image_part_t& part);
+
 struct FrameSenderParams {
   int jpeg_quality = 92;        // 1..100.
   int max_part_bytes = 180000;  // Of image data per message; in [1000, kMaxMessageBytes - 1000].
@@ -72,6 +75,7 @@ class ImageAssembler {
 struct ReceivedFrame {
   rgbd::Frame frame;  // id: the source's frame number.
   std::int64_t sequence = 0;
+  std::vector<std::uint8_t> encoded_color;  // The JPEG or PNG it came as.
 };
 
 // Receives frames; keeps only the newest whole one. A frame of which a part or the depth is missing is never handed out.

@@ -40,6 +40,7 @@ void AddEvaluateLearner(CLI::App& evaluate, Run& run);
 void AddEvaluateRecogniser(CLI::App& evaluate, Run& run);
 void AddEvaluateSegmentation(CLI::App& evaluate, Run& run);
 void AddVocabulary(CLI::App& app, Run& run);
+void AddLog(CLI::App& app, Run& run);
 
 // --seed, --json, --config and --version.
 void AddCommonOptions(CLI::App& verb, CommonOptions& options);

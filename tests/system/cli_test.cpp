@@ -95,9 +95,9 @@ class Cli : public ::testing::Test {
 };
 
 TEST_F(Cli, HelpAndVersionOfEveryVerb) {
-  for (const char* verb :
-       {"", "learn", "recognise", "assess", "explore", "evaluate calibration", "evaluate features", "evaluate learner",
-        "evaluate recogniser", "evaluate segmentation", "models list", "models show", "vocabulary train", "vocabulary show"}) {
+  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "evaluate calibration", "evaluate features",
+                           "evaluate learner", "evaluate recogniser", "evaluate segmentation", "log info", "log verify", "log cut",
+                           "log filter", "log export", "models list", "models show", "vocabulary train", "vocabulary show"}) {
     SCOPED_TRACE(verb);
     const Outcome help = Run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
@@ -123,6 +123,10 @@ TEST_F(Cli, MisuseIsOneLine) {
   ExpectRefused("learn --sequence a --store b --object-pixel 5,6 --object-id 3", "vantage learn", {"object-id"});
   ExpectRefused("recognise --sequence a", "vantage recognise", {"--store"});
   ExpectRefused("models", "vantage models", {});
+  ExpectRefused("log", "vantage log", {});
+  ExpectRefused("log info gone.lcm", "vantage log info", {"gone.lcm"});
+  ExpectRefused("log cut gone.lcm", "vantage log cut", {"--out"});
+  ExpectRefused("log export gone.lcm", "vantage log export", {"--bop", "--csv"});
   ExpectRefused("models show --store a", "vantage models show", {"object"});
   ExpectRefused("vocabulary train --out a", "vantage vocabulary train", {"images"});
   ExpectRefused("explore", "vantage explore", {"--sequence", "--world", "--mesh"});
