@@ -56,7 +56,8 @@ std::int64_t SystemTime_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-Bus::Bus(const std::string& url, Clock clock) : url_(url), clock_(clock ? std::move(clock) : Clock(SystemTime_us)) {
+Bus::Bus(const std::string& url, Clock clock) : url_(url), real_time_(!clock) {
+  clock_ = clock ? std::move(clock) : Clock(SystemTime_us);
   if (url_.empty()) {
     const char* environment = std::getenv("LCM_DEFAULT_URL");
     url_ = environment && *environment ? environment : kDefaultUrl;

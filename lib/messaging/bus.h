@@ -1,6 +1,7 @@
 // A thin wrapper around LCM: clear errors, message size limit, handlers that cannot throw through LCM's C frames, a clock.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -43,6 +44,8 @@ class Bus {
 
   const std::string& url() const { return url_; }
   std::int64_t now_us() const { return clock_(); }
+  // Whether time is the system's; else somebody else's (a test's, a log's).
+  bool real_time() const { return real_time_; }
 
   // Calls `handler` for every message of a channel, from within Handle. Exceptions it throws count as a bad message. The counts
   // live as long as the bus. `queue`: messages LCM keeps while we are busy; when full it drops the newest. Throws
@@ -93,6 +96,7 @@ class Bus {
 
   std::string url_;
   Clock clock_;
+  bool real_time_ = true;
   Tap tap_;
   lcm_t* lcm_ = nullptr;
   std::vector<std::unique_ptr<Subscription>> subscriptions_;
@@ -101,5 +105,21 @@ class Bus {
 
 // Microseconds since the epoch, by the system's clock.
 std::int64_t SystemTime_us();
+
+// How long work takes: real time, or on a clock of somebody else the time that passes there, so that what is published is the same
+// on every run of a replay.
+class Stopwatch {
+ public:
+  explicit Stopwatch(const Bus& bus) : bus_(bus), begin_(std::chrono::steady_clock::now()), begin_us_(bus.now_us()) {}
+  double ms() const {
+    if (!bus_.real_time()) return 1e-3 * static_cast<double>(bus_.now_us() - begin_us_);
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count();
+  }
+
+ private:
+  const Bus& bus_;
+  std::chrono::steady_clock::time_point begin_;
+  std::int64_t begin_us_;
+};
 
 }  // namespace vantage::messaging

@@ -47,6 +47,7 @@ void AssessorNodeParams::Check() const {
   require(retry_period_s > 0.0, "retry_period_s must be > 0");
   require(max_backgrounds >= 0, "max_backgrounds must be >= 0");
   require(niceness >= 0 && niceness <= 19, "niceness must be in 0..19");
+  require(job_frames >= 0, "job_frames must be >= 0");
   recogniser.Check();
   trials.Check();
 }
@@ -72,6 +73,7 @@ AssessorNodeParams LoadAssessorNodeParams(const std::string& config_file, const 
   yaml.Get("retry_period_s", params.retry_period_s);
   yaml.Get("max_backgrounds", params.max_backgrounds);
   yaml.Get("niceness", params.niceness);
+  yaml.Get("job_frames", params.job_frames);
   yaml.Finish();
   yaml.Check(params);
   return params;
@@ -90,17 +92,18 @@ AssessorNode::AssessorNode(messaging::Bus& bus, const AssessorNodeParams& params
 }
 
 std::int64_t AssessorNode::NextStep_us() const {
-  return worker_.busy() ? std::min(next_publish_us_, now_us() + 50000) : next_publish_us_;
+  return params_.job_frames == 0 && worker_.busy() ? std::min(next_publish_us_, now_us() + 50000) : next_publish_us_;
 }
 
-std::string AssessorNode::State() const { return worker_.busy() ? "assessing" : "idle"; }
+std::string AssessorNode::State() const { return Busy() ? "assessing" : "idle"; }
 
 std::string AssessorNode::Detail() const {
   const auto object = objects_.find(current_);
   if (object == objects_.end()) return "";
   std::string text = current_ + ": " + std::to_string(object->second.assessed_views) + " of " +
                      std::to_string(object->second.views) + " views assessed";
-  if (worker_.busy()) text += ", " + std::to_string(static_cast<int>(100.0 * worker_.progress())) + " % of the trials";
+  if (params_.job_frames == 0 && worker_.busy())
+    text += ", " + std::to_string(static_cast<int>(100.0 * worker_.progress())) + " % of the trials";
   return text;
 }
 
@@ -169,8 +172,8 @@ void AssessorNode::OnQuery(const query_t& message) {
 
 void AssessorNode::Step() {
   CountFrames(frames_);
-  if (const auto assessment = worker_.Poll()) OnAssessment(*assessment);
-  if (!worker_.busy()) StartNextJob();
+  if (const auto assessment = TakeAssessment()) OnAssessment(*assessment);
+  if (!Busy()) StartNextJob();
   if (now_us() < next_publish_us_) return;
   next_publish_us_ = now_us() + static_cast<std::int64_t>(params_.publish_period_s * 1e6);
   const auto object = objects_.find(current_);
@@ -187,8 +190,21 @@ void AssessorNode::StartNextJob() {
     }
     auto received = frames_.Take();
     worker_.Start(name, received ? std::optional<rgbd::Frame>(std::move(received->frame)) : std::nullopt);
+    if (params_.job_frames > 0) {
+      job_under_way_ = true;
+      job_effect_frame_ = frames_.frames() + params_.job_frames;
+      worker_.WaitUntilRead();  // The learner may write the next view at any time.
+    }
     return;
   }
+}
+
+std::optional<Assessment> AssessorNode::TakeAssessment() {
+  if (params_.job_frames == 0) return worker_.Poll();
+  if (!job_under_way_ || frames_.frames() < job_effect_frame_) return std::nullopt;
+  job_under_way_ = false;
+  worker_.WaitUntilDone();
+  return worker_.Poll();
 }
 
 void AssessorNode::OnAssessment(const Assessment& assessment) {

@@ -26,6 +26,8 @@ struct AssessorNodeParams {
   double retry_period_s = 5.0;      // After an error; > 0.
   int max_backgrounds = 8;          // Of the run's own frames; >= 0.
   int niceness = 5;                 // Of the thread that runs trials; 0..19.
+  int job_frames = 0;               // Trials take effect so many frames after they began, and are waited for where they are not
+                                    // done by then: a replay is the same on every run. 0: as soon as they are done.
   recognition::RecogniserParams recogniser;
   assessment::TrialParams trials;
   segmentation::PlaneParams plane;
@@ -68,6 +70,9 @@ class AssessorNode : public messaging::Node {
   void OnQuery(const query_t& message);
   void OnAssessment(const Assessment& assessment);
   void StartNextJob();
+  // What came of the trials, once they take effect.
+  std::optional<Assessment> TakeAssessment();
+  bool Busy() const { return params_.job_frames > 0 ? job_under_way_ : worker_.busy(); }
   void Publish(const std::string& name, const Object& object);
   double CompletenessOf(const Object& object) const;
 
@@ -77,7 +82,9 @@ class AssessorNode : public messaging::Node {
   std::map<std::string, Object> objects_;
   std::string current_;  // What the learner is at.
   std::int64_t next_publish_us_ = 0;
-  Worker worker_;  // Last: its thread ends first.
+  bool job_under_way_ = false;         // For job_frames...
+  std::int64_t job_effect_frame_ = 0;  // ...and the frame at which its result is taken.
+  Worker worker_;                      // Last: its thread ends first.
 };
 
 }  // namespace vantage::assessor

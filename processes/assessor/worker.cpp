@@ -35,9 +35,19 @@ void Worker::Start(const std::string& object, std::optional<rgbd::Frame> frame) 
     job_ = object;
     job_frame_ = std::move(frame);
     progress_ = 0.0;
-    busy_ = true;
+    reading_ = busy_ = true;
   }
   wake_.notify_all();
+}
+
+void Worker::WaitUntilRead() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return !reading_; });
+}
+
+void Worker::WaitUntilDone() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return !busy_; });
 }
 
 std::optional<Assessment> Worker::Poll() {
@@ -73,7 +83,8 @@ void Worker::Run() {
     assessment.object = object;
     const std::lock_guard<std::mutex> lock(mutex_);
     result_ = std::move(assessment);
-    busy_ = false;
+    reading_ = busy_ = false;
+    changed_.notify_all();
   }
 }
 
@@ -100,6 +111,11 @@ Worker::Known& Worker::Read(const std::string& object) {
 Assessment Worker::Assess(const std::string& object, const std::optional<rgbd::Frame>& frame) {
   if (frame) AddBackground(*frame);
   Known& known = Read(object);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    reading_ = false;
+  }
+  changed_.notify_all();
   const auto& views = known.model->views;
   const auto next = std::find_if(views.begin(), views.end(), [&](const model::View& view) { return !known.trials.count(view.id); });
   if (next != views.end()) {

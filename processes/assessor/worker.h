@@ -56,6 +56,9 @@ class Worker {
   double progress() const { return progress_; }  // Of the job under way, [0, 1].
   // The result, once.
   std::optional<Assessment> Poll();
+  // For lock step: waits until the job under way has read the store, and until it is done.
+  void WaitUntilRead();
+  void WaitUntilDone();
 
  private:
   struct Known {
@@ -78,6 +81,8 @@ class Worker {
   std::optional<std::string> job_;
   std::optional<rgbd::Frame> job_frame_;
   std::optional<Assessment> result_;
+  bool reading_ = false;             // The job has not read the store yet.
+  std::condition_variable changed_;  // reading_ or busy_ is.
   std::atomic<bool> busy_{false};
   std::atomic<bool> stop_{false};
   std::atomic<double> progress_{0.0};

@@ -1,7 +1,6 @@
 #include "learner/node.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <sstream>
 #include <stdexcept>
@@ -154,11 +153,11 @@ void LearnerNode::Step() {
 }
 
 void LearnerNode::Process(const messaging::ReceivedFrame& received) {
-  const auto start = std::chrono::steady_clock::now();
+  const messaging::Stopwatch stopwatch(bus_);
   learning::Target target;
   if (params_.target_pixel.size() == 2) target.pixel = Eigen::Vector2d(params_.target_pixel[0], params_.target_pixel[1]);
   last_.result = learner_->Process(received.frame, target);
-  const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
+  last_.process_ms = stopwatch.ms();
   Count("frames");
   if (last_.result.T_camera_object) Count("tracked");
 
@@ -169,7 +168,6 @@ void LearnerNode::Process(const messaging::ReceivedFrame& received) {
   const auto object = learner_->object();
   last_.views = object ? static_cast<int>(object->views.size()) : 0;
   last_.points = object ? static_cast<int>(object->points.size()) : 0;
-  last_.process_ms = elapsed.count();
   unsaved_ |= last_.result.view_added || last_.result.refined;
   NoteScene(received.frame, last_.result.view_added);
   bus_.Publish(messaging::kLearnerTrack, messaging::ToMessage(last_));

@@ -1,7 +1,6 @@
 #include "planner/node.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -189,7 +188,7 @@ bool PlannerNode::StopIsCertain(exploration::StopReason reason) const {
 }
 
 void PlannerNode::Plan() {
-  const auto start = std::chrono::steady_clock::now();
+  const messaging::Stopwatch stopwatch(bus_);
   if (first_decision_us_ == 0) first_decision_us_ = now_us();
   ListCandidates();
   const auto mount = motion::MakeFreeMount(params_.mount, obstacles_);
@@ -199,7 +198,7 @@ void PlannerNode::Plan() {
   }
   if (ElapsedSince(first_decision_us_) > BudgetS()) return Finish(exploration::ToString(exploration::StopReason::kTimeBudget));
   decision_ = strategy_->Decide(belief_, candidates_, mount_state_->T_world_camera(), *mount, ElapsedSince(first_decision_us_));
-  plan_s_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  plan_s_ = 1e-3 * stopwatch.ms();
   total_plan_s_ += plan_s_;
   status_.completeness = decision_->completeness;
   if (decision_->chosen < 0) {
@@ -280,7 +279,7 @@ void PlannerNode::EndAttempt(bool reached) {
   if (!attempt.view_added) ++status_.failed_attempts;
   status_.views = views();
   const std::string outcome = attempt.view_added ? "view added" : reached ? look_.note : "the mount refuses to go there";
-  std::printf("%6.1f s  attempt %d: %s; %d views, completeness %.3f before it\n", ElapsedSince(first_decision_us_),
+  std::fprintf(stderr, "%6.1f s  attempt %d: %s; %d views, completeness %.3f before it\n", ElapsedSince(first_decision_us_),
               status_.attempts, outcome.c_str(), views(), status_.completeness);
   Wait("the next decision");
 }
@@ -292,7 +291,7 @@ void PlannerNode::Finish(const std::string& reason) {
   status_.state = "done";
   status_.stop_reason = reason;
   status_.views = views();
-  std::printf("%6.1f s  stopped: %s%s; %d views, completeness %.3f\n",
+  std::fprintf(stderr, "%6.1f s  stopped: %s%s; %d views, completeness %.3f\n",
               first_decision_us_ > 0 ? ElapsedSince(first_decision_us_) : 0.0, reason.c_str(),
               status_.decision == 0 && !waiting_for_.empty() ? (" (waited for " + waiting_for_ + ")").c_str() : "", views(),
               status_.completeness);

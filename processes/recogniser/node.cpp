@@ -1,6 +1,5 @@
 #include "recogniser/node.h"
 
-#include <chrono>
 #include <filesystem>
 #include <stdexcept>
 #include <vantage/object_prior_t.hpp>
@@ -82,7 +81,7 @@ void RecogniserNode::Step() {
 }
 
 void RecogniserNode::Recognise(const messaging::ReceivedFrame& received) {
-  const auto start = std::chrono::steady_clock::now();
+  const messaging::Stopwatch stopwatch(bus_);
   messaging::FrameDetections detections;
   detections.utime = received.frame.utime;
   detections.sequence = received.sequence;
@@ -91,8 +90,7 @@ void RecogniserNode::Recognise(const messaging::ReceivedFrame& received) {
     const auto features = recogniser_.Extract(received.frame);
     detections.detections = recogniser_.Recognise(received.frame, features, {priors_.begin(), priors_.end()});
   }
-  const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
-  detections.process_ms = elapsed.count();
+  detections.process_ms = stopwatch.ms();
   Count("frames");
   Count("detections", static_cast<std::int64_t>(detections.detections.size()));
   bus_.Publish(messaging::kRecogniserDetections, messaging::ToMessage(detections));

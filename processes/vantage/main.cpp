@@ -54,6 +54,7 @@ int main(int argc, char** argv) {
   vantage::cli::AddEvaluate(app, run);
   vantage::cli::AddVocabulary(app, run);
   vantage::cli::AddLog(app, run);
+  vantage::cli::AddReplay(app, run);
   if (const std::string word = UnknownVerb(app, argc, argv); !word.empty()) {
     return Fail("vantage", "there is no verb '" + word + "'; see vantage --help");
   }

@@ -41,6 +41,7 @@ void AddEvaluateRecogniser(CLI::App& evaluate, Run& run);
 void AddEvaluateSegmentation(CLI::App& evaluate, Run& run);
 void AddVocabulary(CLI::App& app, Run& run);
 void AddLog(CLI::App& app, Run& run);
+void AddReplay(CLI::App& app, Run& run);
 
 // --seed, --json, --config and --version.
 void AddCommonOptions(CLI::App& verb, CommonOptions& options);

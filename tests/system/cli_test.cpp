@@ -95,9 +95,26 @@ class Cli : public ::testing::Test {
 };
 
 TEST_F(Cli, HelpAndVersionOfEveryVerb) {
-  for (const char* verb : {"", "learn", "recognise", "assess", "explore", "evaluate calibration", "evaluate features",
-                           "evaluate learner", "evaluate recogniser", "evaluate segmentation", "log info", "log verify", "log cut",
-                           "log filter", "log export", "models list", "models show", "vocabulary train", "vocabulary show"}) {
+  for (const char* verb : {"",
+                           "learn",
+                           "recognise",
+                           "assess",
+                           "explore",
+                           "evaluate calibration",
+                           "evaluate features",
+                           "evaluate learner",
+                           "evaluate recogniser",
+                           "evaluate segmentation",
+                           "log info",
+                           "log verify",
+                           "log cut",
+                           "log filter",
+                           "log export",
+                           "models list",
+                           "models show",
+                           "replay",
+                           "vocabulary train",
+                           "vocabulary show"}) {
     SCOPED_TRACE(verb);
     const Outcome help = Run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
@@ -126,6 +143,9 @@ TEST_F(Cli, MisuseIsOneLine) {
   ExpectRefused("log", "vantage log", {});
   ExpectRefused("log info gone.lcm", "vantage log info", {"gone.lcm"});
   ExpectRefused("log cut gone.lcm", "vantage log cut", {"--out"});
+  ExpectRefused("replay gone.lcm --out a.lcm", "vantage replay", {"gone.lcm"});
+  ExpectRefused("replay gone.lcm", "vantage replay", {"--out"});
+  ExpectRefused("replay gone.lcm --out a.lcm --processes learner,gardener", "vantage replay", {"gardener", "recogniser"});
   ExpectRefused("log export gone.lcm", "vantage log export", {"--bop", "--csv"});
   ExpectRefused("models show --store a", "vantage models show", {"object"});
   ExpectRefused("vocabulary train --out a", "vantage vocabulary train", {"images"});
