@@ -10,6 +10,7 @@
 
 #include "simulation/orbit_sequence.h"
 #include "vantage/learner_trial.h"
+#include "vantage/pose_witness.h"
 #include "vantage/sequence_trial.h"
 
 namespace vantage::cli {
@@ -217,7 +218,8 @@ void RunEvaluateLearner(const LearnerOptions& options) {
   const params::LibraryParams params = LoadParams(options.common);
   if (!options.sequence.folder.empty()) {
     const Json result = TrySequence(options.sequence, params.learner, options.save);
-    return WriteResult(options.common, result, SummaryOf(result));
+    const std::string witness = result.contains("witness") ? "  " + WitnessSummary(result["witness"]) : "";
+    return WriteResult(options.common, result, SummaryOf(result) + witness);
   }
   const simulation::WorldParams base =
       options.world.empty() ? simulation::WorldParams() : simulation::LoadWorldParams(options.world);
@@ -302,6 +304,13 @@ void AddEvaluateLearner(CLI::App& evaluate, Run& run) {
       ->needs(folder);
   verb->add_flag("--no-query-depth", sequence.no_query_depth, "With --sequence: views are placed by their colour images only")
       ->needs(folder);
+  verb->add_option(
+          "--witness-gap", sequence.witness_gap,
+          "With --sequence: hold recorded and tracked poses against the camera's motion over so many frames as the background's "
+          "surface and texture show it")
+      ->check(CLI::Range(1, 10000))
+      ->needs(folder)
+      ->type_name("N");
   verb->add_option("--start-azimuth", options->start_azimuth_deg,
                    "Where the camera begins, degrees about z from x (default: before the object's broadest side)")
       ->type_name("DEG");

@@ -53,6 +53,7 @@ const TrialStep& LearnerTrial::Step(const rgbd::Frame& frame, const FrameTruth& 
   if (const auto object = learner_.object()) {
     step.views = static_cast<int>(object->views.size());
     step.points = static_cast<int>(object->points.size());
+    for (const ViewError& view : ViewErrors()) step.wrong_views += view.wrong();
   }
   step.memory_mb = ResidentMemory_mb();
   steps_.push_back(std::move(step));

@@ -38,6 +38,7 @@ struct TrialStep {
   bool wrong = false;              // Tracked, but wrong or not there.
   learning::LearnerResult result;
   int views = 0;
+  int wrong_views = 0;  // Of these, as the model has them now.
   int points = 0;
   double ms = 0.0;         // Wall clock of Learner::Process.
   double cpu_ms = 0.0;     // Processor time of the calling thread.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "vantage/learner_trial.h"
+#include "vantage/pose_witness.h"
 #include "vantage/sequence.h"
 
 namespace vantage::cli {
@@ -48,6 +49,19 @@ class SequenceRun {
       if (error) errors.push_back(*error);
     }
     return {{"frames", frames}, {"right", right}, {"wrong", wrong}, {"error", ErrorFigures(errors)}};
+  }
+
+  // Of the frames tracked in the first pass whose camera pose was recorded.
+  Json Witness(const learning::LearnerParams& params) const {
+    std::vector<WitnessedFrame> frames;
+    for (const TrialStep& step : trial_.steps()) {
+      if (!step.tracked || step.truth.circle > 0) continue;
+      rgbd::Frame frame = scene_.Load(static_cast<int>(step.frame_id));
+      if (!frame.T_world_camera || frame.depth.empty()) continue;
+      const geometry::Rigid T_camera_world = frame.T_world_camera->inverse();
+      frames.push_back({std::move(frame), T_camera_world, *step.result.T_camera_object});
+    }
+    return WitnessFigures(frames, trial_.learner().object()->PointMatrix(), params, options_.witness_gap);
   }
 
   const LearnerTrial& trial() const { return trial_; }
@@ -106,6 +120,7 @@ Json TrySequence(const SequenceTrialOptions& options, learning::LearnerParams pa
   result["query_depth"] = params.recogniser.use_query_depth;
   result.update(FiguresOf(run.trial()));
   if (!options.find.empty()) result["found"] = run.Find(params.recogniser);
+  if (options.witness_gap > 0) result["witness"] = run.Witness(params);
   if (!save.empty()) SaveTrial(run.trial(), run.name(), save);
   return result;
 }

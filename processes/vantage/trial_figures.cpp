@@ -40,9 +40,16 @@ Json ViewFigures(const LearnerTrial& trial) {
     without_object += !view.error;
     if (view.error) errors.push_back(*view.error);
   }
+  int wrong_at_worst = 0, frames_with_wrong = 0;
+  for (const TrialStep& step : trial.steps()) {
+    wrong_at_worst = std::max(wrong_at_worst, step.wrong_views);
+    frames_with_wrong += step.wrong_views > 0;
+  }
   Json figures;
   figures["count"] = errors.size() + static_cast<std::size_t>(without_object);
-  figures["wrong"] = wrong;  // Off by more than 20 mm or 5 degrees, or without the object.
+  figures["wrong"] = wrong;                    // Off by more than 20 mm or 5 degrees, or without the object.
+  figures["wrong_at_worst"] = wrong_at_worst;  // On the way: drift that was not closed yet counts.
+  figures["frames_with_wrong"] = frames_with_wrong;
   figures["without_object"] = without_object;
   figures["error"] = ErrorFigures(errors);
   return figures;
@@ -101,7 +108,7 @@ std::string FrameTable(const LearnerTrial& trial) {
   table.precision(6);
   table << "frame,time_s,circle,faulty,usable,state,tracked,wrong,error_mm,error_deg,confidence,probability,inliers,spread_mm,"
            "spread_deg,likeness,reference_view,"
-           "view_added,views,points,ms,cpu_ms,memory_mb,note\n";
+           "view_added,views,wrong_views,points,ms,cpu_ms,memory_mb,note\n";
   for (const TrialStep& step : trial.steps()) {
     const learning::LearnerResult& result = step.result;
     table << step.frame_id << ',' << step.truth.time_s << ',' << step.truth.circle << ',' << step.truth.faulty << ','
@@ -112,8 +119,8 @@ std::string FrameTable(const LearnerTrial& trial) {
       table << "NaN,NaN";
     table << ',' << result.confidence.value << ',' << result.probability << ',' << result.inliers << ','
           << 1e3 * result.spread.sigma_m << ',' << result.spread.sigma_rad * 180.0 / M_PI << ',' << result.likeness.value_or(NAN)
-          << ',' << result.reference_view << ',' << result.view_added << ',' << step.views << ',' << step.points << ',' << step.ms
-          << ',' << step.cpu_ms << ',' << step.memory_mb << ',' << Quoted(result.note) << '\n';
+          << ',' << result.reference_view << ',' << result.view_added << ',' << step.views << ',' << step.wrong_views << ','
+          << step.points << ',' << step.ms << ',' << step.cpu_ms << ',' << step.memory_mb << ',' << Quoted(result.note) << '\n';
   }
   return table.str();
 }
@@ -202,7 +209,8 @@ std::string SummaryOf(const Json& figures) {
   text << figures["object"].get<std::string>() << ": tracked " << tracking["tracked"] << " of " << tracking["usable"]
        << " usable frames (" << tracking["wrong"] << " wrong), error " << tracking["error"]["mm"]["median"] << " mm "
        << tracking["error"]["deg"]["median"] << " deg (median), max " << tracking["error"]["mm"]["max"] << " mm\n  "
-       << views["count"] << " views (" << views["wrong"] << " wrong), error " << views["error"]["mm"]["median"] << " mm "
+       << views["count"] << " views (" << views["wrong"] << " wrong; on the way " << views["wrong_at_worst"] << " at worst, in "
+       << views["frames_with_wrong"] << " frames), error " << views["error"]["mm"]["median"] << " mm "
        << views["error"]["deg"]["median"] << " deg, max " << views["error"]["mm"]["max"] << " mm " << views["error"]["deg"]["max"]
        << " deg\n  ";
   if (figures.contains("points") && !figures["points"].is_null()) {
