@@ -27,6 +27,7 @@ void LearnerParams::Check() const {
   require(min_links >= 3, "min_links must be >= 3");
   require(min_surface_agreement > 0.0 && min_surface_agreement <= 1.0, "min_surface_agreement must be in (0, 1]");
   require(max_plain_spread_deg > 0.0, "max_plain_spread_deg must be > 0");
+  require(min_plain_confidence >= 0.0 && min_plain_confidence < 1.0, "min_plain_confidence must be in [0, 1)");
   require(surface_prior >= 0.5 && surface_prior < 1.0, "surface_prior must be in [1/2, 1)");
   require(min_likeness >= -1.0 && min_likeness <= 1.0, "min_likeness must be in [-1, 1]");
   require(neighbour_views >= 0, "neighbour_views must be >= 0");

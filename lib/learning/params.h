@@ -36,7 +36,9 @@ struct LearnerParams {
   double min_surface_agreement = 0.85;  // Where the last frames lead, and this share of the surface is measured in its place, the
                                         // object is held without interest points; (0, 1]...
   double surface_prior = 0.99;          // ...and p(o) is this; [1/2, 1)...
-  double max_plain_spread_deg = 0.8;    // ...and a new view wants its axes held this well; > 0.
+  double max_plain_spread_deg = 0.8;    // ...and a new view wants its axes held this well; > 0...
+  double min_plain_confidence = 0.15;  // ...and this share seen of the learned points that ought to be, if there are any: a blurred
+                                       // picture is no plain side; [0, 1).
   // Refinement, beside tracking:
   bool refine = true;            // Loops closed, views and points adjusted, the model tidied up.
   int refine_delay_frames = 15;  // It takes effect so many frames after it began; >= 1.

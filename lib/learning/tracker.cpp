@@ -109,7 +109,9 @@ void Tracker::Weigh(const rgbd::Frame& frame, const Evidence& evidence, Track* t
   const pose::Appearance independent = WithTextureOf(evidence.appearance, kIndependentTexture);
   const pose::DenseFit dense =
       pose::FitDensely(independent, frame, evidence.smooth(), track->T_camera_object, params_.refinement.dense, 0);
-  track->likeness = dense.likeness;
+  const pose::Appearance all_texture{{}, evidence.appearance.textures};  // Of few samples too few are seen from aside to compare.
+  track->likeness =
+      pose::FitDensely(all_texture, frame, evidence.smooth(), track->T_camera_object, params_.refinement.dense, 0).likeness;
   track->surface_agreement = dense.agreement;
   track->spread =
       pose::SpreadOfPose(evidence.matches, evidence.all, frame.camera, track->T_camera_object, kPixelSigma, dense.information);

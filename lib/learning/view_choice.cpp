@@ -10,6 +10,11 @@ namespace {
 
 constexpr double kRadians = M_PI / 180.0;
 
+// Points ought to be seen and hardly one is: the picture, not the side, is plain.
+bool IsSpoiled(const model::Confidence& confidence, const LearnerParams& params) {
+  return confidence.visible >= params.recogniser.confidence.min_points && confidence.value < params.min_plain_confidence;
+}
+
 }  // namespace
 
 Hold HoldOf(const Sighting& sighting, const LearnerParams& params) {
@@ -18,6 +23,7 @@ Hold HoldOf(const Sighting& sighting, const LearnerParams& params) {
   const double spread_deg = track.spread.sigma_rad / kRadians;
   if (track.spread.sigma_m > params.max_spread_m || track.likeness.value_or(1.0) < params.min_likeness) return Hold::kNone;
   if (static_cast<int>(track.matches.size()) >= params.min_links && spread_deg <= params.max_spread_deg) return Hold::kFirm;
+  if (IsSpoiled(track.confidence, params)) return Hold::kNone;
   return sighting.continued && spread_deg <= params.max_plain_spread_deg ? Hold::kPlain : Hold::kNone;
 }
 

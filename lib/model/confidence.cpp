@@ -107,7 +107,9 @@ Confidence ObjectConfidence(const ObjectModel& model, const geometry::Rigid& T_c
   Confidence best;
   for (const int view : NearestViews(model, T_camera_object, params.max_views)) {
     const Confidence confidence = ViewConfidence(model, view, T_camera_object, frame, keypoints, params);
-    if (confidence.value > best.value) best = confidence;  // Equation (2)
+    const bool first =
+        best.view < 0 && confidence.visible >= params.min_points;   // It says something, if only that nothing is seen.
+    if (first || confidence.value > best.value) best = confidence;  // Equation (2)
   }
   return best;
 }

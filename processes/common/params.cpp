@@ -195,6 +195,7 @@ void Fields(Visitor& visit, learning::LearnerParams& params) {
   visit("min_surface_agreement", params.min_surface_agreement);
   visit("surface_prior", params.surface_prior);
   visit("max_plain_spread_deg", params.max_plain_spread_deg);
+  visit("min_plain_confidence", params.min_plain_confidence);
   visit("refine", params.refine);
   visit("refine_delay_frames", params.refine_delay_frames);
   visit("refined_views", params.refined_views);

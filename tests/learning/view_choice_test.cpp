@@ -70,6 +70,20 @@ TEST(HoldOf, PlainUpToItsOwnSpread) {
   EXPECT_EQ(HoldOf({track, true}, params), Hold::kNone);
 }
 
+TEST(HoldOf, ABlurredPictureIsNoPlainSide) {
+  const LearnerParams params;
+  Track track = TrackedFrom(0.0);
+  track.matches.clear();
+  track.confidence.visible = 100;
+  track.confidence.value = 0.5 * params.min_plain_confidence;
+  EXPECT_EQ(HoldOf({track, true}, params), Hold::kNone);
+  track.confidence.value = 1.5 * params.min_plain_confidence;
+  EXPECT_EQ(HoldOf({track, true}, params), Hold::kPlain);
+  track.confidence.visible = 0;  // Nothing ought to be seen.
+  track.confidence.value = 0.0;
+  EXPECT_EQ(HoldOf({track, true}, params), Hold::kPlain);
+}
+
 TEST(HoldOf, WhatLooksOtherwiseIsNotHeldUnlessTheMountSaysSo) {
   const LearnerParams params;
   Track track = TrackedFrom(0.0);

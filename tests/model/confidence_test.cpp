@@ -41,7 +41,10 @@ TEST(Confidence, IsTheShareOfVisiblePointsWithAnInterestPoint) {
   keypoints.resize(60);
   EXPECT_NEAR(value(keypoints).value, 60.0 / 121, 1e-12);
   EXPECT_EQ(value(keypoints).view, 0);
-  EXPECT_EQ(value({}).value, 0.0);
+  const Confidence none = value({});  // What ought to be seen is said where nothing is.
+  EXPECT_EQ(none.value, 0.0);
+  EXPECT_EQ(none.visible, 121);
+  EXPECT_EQ(none.view, 0);
 }
 
 TEST(Confidence, SupportMustBeNearAndOfTheExpectedSize) {
