@@ -166,9 +166,12 @@ std::vector<pose::BundleRelation> RelationsOf(const model::ObjectModel& object, 
     if (!params.use_depth) frame.depth = cv::Mat();
     const pose::SmoothImage image(frame, cv::Rect({0, 0}, frame.color.size()));
     const geometry::Rigid T_b_a = problem.views[b].T_camera_object * problem.views[a].T_camera_object.inverse();
-    const pose::DenseFit fit = pose::FitDensely(appearance, frame, &image, T_b_a, params.dense);
+    pose::DenseFit fit = pose::FitDensely(appearance, frame, &image, T_b_a, params.dense);
+    const bool alike = fit.likeness.value_or(is_linked ? 1.0 : 0.0) >= params.min_likeness;
+    if (!alike && !is_linked) continue;
+    // What does not look alike where its looks drew it (a blur, a shine) was led astray by them: the surface alone is asked.
+    if (!alike && params.use_depth) fit = pose::FitDensely({appearance.surface, {}}, frame, nullptr, T_b_a, params.dense);
     if (4 * fit.samples <= params.surface_samples && 4 * fit.texture_samples <= params.texture_samples) continue;
-    if (!is_linked && fit.likeness.value_or(0.0) < params.min_likeness) continue;
     if (MeanMove(appearance, T_b_a, fit.T_camera_object) > params.max_relation_move_m) continue;
     relations.push_back({a, b, fit.T_camera_object, fit.information});
   }
