@@ -11,8 +11,8 @@
 namespace vantage::messaging {
 namespace {
 
-constexpr std::size_t kMaxPending = 8;  // Images waiting for parts or for their other half.
-constexpr std::int64_t kMaxLateness_us = 5000000;
+constexpr std::size_t kMaxPending = 8;       // Images waiting for parts or for their other half.
+constexpr std::int64_t kMaxMissed = 100000;  // A greater step of the sequence is another sender's.
 
 std::uint32_t BigEndian32(const unsigned char* bytes) {
   return (std::uint32_t{bytes[0]} << 24) | (std::uint32_t{bytes[1]} << 16) | (std::uint32_t{bytes[2]} << 8) | bytes[3];
@@ -23,9 +23,24 @@ bool SameImage(const image_part_t& a, const image_part_t& b) {
          a.camera.width == b.camera.width && a.camera.height == b.camera.height;
 }
 
+// Forgets what came first, whatever time it claims to be of.
 template <typename Map>
 void Limit(Map& map) {
-  while (map.size() > kMaxPending) map.erase(map.begin());
+  while (map.size() > kMaxPending) {
+    map.erase(
+        std::min_element(map.begin(), map.end(), [](const auto& a, const auto& b) { return a.second.order < b.second.order; }));
+  }
+}
+
+// How many sequence numbers lie between; none where the sender began anew. `last` -1: there was none.
+std::int64_t Missed(std::int64_t last, std::int64_t sequence) {
+  if (last < 0 || sequence <= last || sequence - last > kMaxMissed) return 0;
+  return sequence - last - 1;
+}
+
+bool EncodingBelongs(std::int8_t encoding, bool is_depth) {
+  if (is_depth) return encoding == image_part_t::DEPTH_RVL;
+  return encoding == image_part_t::JPEG || encoding == image_part_t::PNG;
 }
 
 Result<rgbd::Frame> Decode(const EncodedImage& color, const EncodedImage& depth) {
@@ -66,7 +81,7 @@ bool PlausibleBytes<image_part_t>(const void* data, std::uint32_t size) {
 }
 
 std::string WhyNotAPart(const image_part_t& part) {
-  if (part.utime <= 0) return "an image without a capture time";
+  if (part.utime <= 0 || part.sequence < 0) return "an image without a capture time or number";
   if (part.total_size < 1 || part.total_size > kMaxEncodedImageBytes) {
     return "an image of " + std::to_string(part.total_size) + " bytes";
   }
@@ -141,10 +156,17 @@ Result<std::optional<EncodedImage>> ImageAssembler::Add(const image_part_t& part
     partial.header.size = 0;
     partial.parts.assign(static_cast<std::size_t>(part.parts), {});
     partial.missing = part.parts;
+    partial.bytes = 0;
+    partial.order = ++arrivals_;
   }
   auto& slot = partial.parts[static_cast<std::size_t>(part.part)];
   if (slot.empty()) --partial.missing;
+  partial.bytes += part.data.size() - slot.size();
   slot = part.data;
+  if (partial.bytes > static_cast<std::size_t>(part.total_size)) {
+    partials_.erase(entry);
+    return Image::Error("an image whose parts make more than its " + std::to_string(part.total_size) + " bytes");
+  }
   if (partial.missing > 0) {
     Limit(partials_);
     return std::optional<EncodedImage>();
@@ -163,68 +185,75 @@ Result<std::optional<EncodedImage>> ImageAssembler::Add(const image_part_t& part
 
 void ImageAssembler::DropUntil(std::int64_t utime) { partials_.erase(partials_.begin(), partials_.upper_bound(utime)); }
 
-FrameReceiver::FrameReceiver(Bus& bus)
-    : color_counts_(&bus.Subscribe<image_part_t>(kSensorColor, [this](const image_part_t& part) { OnPart(part, false); })),
-      depth_counts_(&bus.Subscribe<image_part_t>(kSensorDepth, [this](const image_part_t& part) { OnPart(part, true); })) {}
-
-void FrameReceiver::Refuse(const std::string& why) {
-  ++refused_;
-  last_refusal_ = why;
+FrameReceiver::FrameReceiver(Bus& bus) {
+  for (const auto& [half, channel] : {std::pair(&color_, kSensorColor), std::pair(&depth_, kSensorDepth)}) {
+    half->channel = channel;
+    half->counts = &bus.Subscribe<image_part_t>(channel, [this, to = half](const image_part_t& part) { OnPart(part, *to); });
+  }
 }
 
-void FrameReceiver::OnPart(const image_part_t& part, bool is_depth) {
-  const std::string channel = is_depth ? kSensorDepth : kSensorColor;
-  const bool right_encoding = is_depth ? part.encoding == image_part_t::DEPTH_RVL
-                                       : part.encoding == image_part_t::JPEG || part.encoding == image_part_t::PNG;
-  if (!right_encoding) return Refuse(channel + ": encoding " + std::to_string(part.encoding) + " is not one for this channel");
+void FrameReceiver::Refuse(Half& half, const std::string& why) {
+  ++half.refused;
+  last_refusal_ = half.channel + ": " + why;
+}
+
+void FrameReceiver::OnPart(const image_part_t& part, Half& half) {
+  if (!EncodingBelongs(part.encoding, &half == &depth_)) {
+    return Refuse(half, "encoding " + std::to_string(part.encoding) + " is not one for this channel");
+  }
   if (frames_ > 0 && part.utime <= last_utime_) {
-    if (part.utime > last_utime_ - kMaxLateness_us) return;  // Late or doubled.
-    Restart();                                               // A log is played, or the sender's clock was set.
+    if (part.utime == last_utime_) return;  // Doubled.
+    if (part.utime > last_utime_ - kMaxLateness_us) {
+      return Refuse(half, "utime goes backwards by " + std::to_string(last_utime_ - part.utime) + " us");
+    }
+    Restart();  // A log is played, or the sender's clock was set.
   }
 
-  auto image = (is_depth ? depth_parts_ : color_parts_).Add(part);
-  if (!image) return Refuse(channel + ": " + image.error);
+  auto image = half.parts.Add(part);
+  if (!image) return Refuse(half, image.error);
   if (!*image) return;
-  auto& waiting = is_depth ? depths_ : colors_;
-  waiting[part.utime] = std::move(**image);
-  Limit(waiting);
+  half.lost += Missed(half.last_sequence, part.sequence);
+  half.last_sequence = part.sequence;
+  half.whole[part.utime] = {std::move(**image), ++arrivals_};
+  Limit(half.whole);
   Pair(part.utime);
 }
 
 void FrameReceiver::Restart() {
-  for (auto* parts : {&color_parts_, &depth_parts_}) parts->DropUntil(std::numeric_limits<std::int64_t>::max());
-  colors_.clear();
-  depths_.clear();
-  last_sequence_ = std::numeric_limits<std::int64_t>::max();
+  for (Half* half : {&color_, &depth_}) {
+    half->parts.DropUntil(std::numeric_limits<std::int64_t>::max());
+    half->whole.clear();
+    half->last_sequence = -1;
+  }
+  last_sequence_ = -1;
   last_utime_ = 0;
 }
 
 void FrameReceiver::Pair(std::int64_t utime) {
-  const auto color = colors_.find(utime);
-  if (color == colors_.end()) return;
+  const auto color = color_.whole.find(utime);
+  if (color == color_.whole.end()) return;
   EncodedFrame frame;
-  if (color->second.header.with_depth) {
-    const auto depth = depths_.find(utime);
-    if (depth == depths_.end()) return;
-    frame.depth = std::move(depth->second);
+  if (color->second.image.header.with_depth) {
+    const auto depth = depth_.whole.find(utime);
+    if (depth == depth_.whole.end()) return;
+    frame.depth = std::move(depth->second.image);
   }
-  frame.color = std::move(color->second);
+  frame.color = std::move(color->second.image);
   Complete(std::move(frame));
 }
 
 void FrameReceiver::Complete(EncodedFrame frame) {
   const image_part_t& header = frame.color.header;
-  const bool restarted = header.sequence <= last_sequence_;
-  if (frames_ > 0 && !restarted) gaps_ += header.sequence - last_sequence_ - 1;
+  gaps_ += Missed(last_sequence_, header.sequence);
   last_sequence_ = header.sequence;
   last_utime_ = header.utime;
   ++frames_;
 
   // Whatever is older can only be what was lost.
-  color_parts_.DropUntil(header.utime);
-  depth_parts_.DropUntil(header.utime);
-  colors_.erase(colors_.begin(), colors_.upper_bound(header.utime));
-  depths_.erase(depths_.begin(), depths_.upper_bound(header.utime));
+  for (Half* half : {&color_, &depth_}) {
+    half->parts.DropUntil(header.utime);
+    half->whole.erase(half->whole.begin(), half->whole.upper_bound(header.utime));
+  }
 
   if (newest_) ++skipped_;
   newest_ = std::move(frame);
@@ -236,17 +265,15 @@ std::optional<ReceivedFrame> FrameReceiver::Take() {
   newest_.reset();
   auto frame = Decode(encoded.color, encoded.depth);
   if (!frame) {
-    Refuse(std::string(kSensorColor) + ": frame " + std::to_string(encoded.color.header.sequence) + ": " + frame.error);
+    Refuse(color_, "frame " + std::to_string(encoded.color.header.sequence) + ": " + frame.error);
     return std::nullopt;
   }
   return ReceivedFrame{std::move(*frame), encoded.color.header.sequence, std::move(encoded.color.bytes)};
 }
 
-std::int64_t FrameReceiver::bad() const { return refused_ + color_counts_->bad + depth_counts_->bad; }
-
 std::string FrameReceiver::last_error() const {
   if (!last_refusal_.empty()) return last_refusal_;
-  return color_counts_->last_error.empty() ? depth_counts_->last_error : color_counts_->last_error;
+  return color_.counts->last_error.empty() ? depth_.counts->last_error : color_.counts->last_error;
 }
 
 }  // namespace vantage::messaging

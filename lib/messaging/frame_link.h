@@ -67,8 +67,11 @@ class ImageAssembler {
     image_part_t header;
     std::vector<std::vector<std::uint8_t>> parts;
     int missing = 0;
+    std::size_t bytes = 0;   // In the parts that are there.
+    std::int64_t order = 0;  // Of arrival.
   };
   std::map<std::int64_t, Partial> partials_;  // By utime.
+  std::int64_t arrivals_ = 0;
 };
 
 // A frame as it arrived.
@@ -77,6 +80,9 @@ struct ReceivedFrame {
   std::int64_t sequence = 0;
   std::vector<std::uint8_t> encoded_color;  // The JPEG or PNG it came as.
 };
+
+// A message older than the newest by at most this is late; by more, and its sender was started again, or a log is played.
+inline constexpr std::int64_t kMaxLateness_us = 5000000;
 
 // Receives frames; keeps only the newest whole one. A frame of which a part or the depth is missing is never handed out.
 class FrameReceiver {
@@ -95,10 +101,15 @@ class FrameReceiver {
   // Forgets what Take would return; not counted as skipped.
   void Drop() { newest_.reset(); }
 
-  std::int64_t frames() const { return frames_; }    // Whole ones that arrived.
-  std::int64_t gaps() const { return gaps_; }        // Frames that did not arrive whole.
-  std::int64_t skipped() const { return skipped_; }  // Replaced by a newer one before they were taken.
-  std::int64_t bad() const;                          // Messages refused, frames that could not be decoded.
+  std::int64_t frames() const { return frames_; }                   // Whole ones that arrived.
+  std::int64_t gaps() const { return gaps_; }                       // Frames that did not arrive whole.
+  std::int64_t skipped() const { return skipped_; }                 // Replaced by a newer one before they were taken.
+  std::int64_t bad() const { return bad_colors() + bad_depths(); }  // Messages refused, frames that could not be decoded.
+  std::int64_t bad_colors() const { return color_.refused + color_.counts->bad; }
+  std::int64_t bad_depths() const { return depth_.refused + depth_.counts->bad; }
+  // Images of either channel that did not arrive whole, by the sequence numbers of those that did.
+  std::int64_t lost_colors() const { return color_.lost; }
+  std::int64_t lost_depths() const { return depth_.lost; }
   std::string last_error() const;
 
  private:
@@ -107,26 +118,37 @@ class FrameReceiver {
     EncodedImage depth;  // No bytes: none.
   };
 
-  void OnPart(const image_part_t& part, bool is_depth);
+  struct Waiting {
+    EncodedImage image;
+    std::int64_t order = 0;  // Of arrival.
+  };
+  // One of the two channels.
+  struct Half {
+    std::string channel;
+    ImageAssembler parts;
+    std::map<std::int64_t, Waiting> whole;  // Waiting for their other half; by utime.
+    std::int64_t last_sequence = -1;        // Of the newest whole one; -1: none.
+    std::int64_t lost = 0;
+    std::int64_t refused = 0;
+    const SubscriptionCounts* counts = nullptr;
+  };
+
+  void OnPart(const image_part_t& part, Half& half);
   void Pair(std::int64_t utime);
   void Restart();
   void Complete(EncodedFrame frame);
-  void Refuse(const std::string& why);
+  void Refuse(Half& half, const std::string& why);
 
-  ImageAssembler color_parts_;
-  ImageAssembler depth_parts_;
-  std::map<std::int64_t, EncodedImage> colors_;  // Complete, waiting for their other half; by utime.
-  std::map<std::int64_t, EncodedImage> depths_;
+  Half color_;
+  Half depth_;
+  std::int64_t arrivals_ = 0;
   std::optional<EncodedFrame> newest_;
   std::int64_t last_sequence_ = -1;
   std::int64_t last_utime_ = 0;
   std::int64_t frames_ = 0;
   std::int64_t gaps_ = 0;
   std::int64_t skipped_ = 0;
-  std::int64_t refused_ = 0;
   std::string last_refusal_;
-  const SubscriptionCounts* color_counts_;
-  const SubscriptionCounts* depth_counts_;
 };
 
 }  // namespace vantage::messaging

@@ -33,7 +33,8 @@ class Node {
   void PublishStatus();
   // Runs Step; an exception is noted as an error.
   void RunStep();
-  // Notes an error, and writes it to stderr where it is another than the last.
+  // Notes an error, and writes it to stderr where it is another than the last; at most one line a second, which says how many were
+  // left out.
   void NoteError(const std::string& error);
 
   const std::string& process() const { return process_; }
@@ -49,7 +50,24 @@ class Node {
 
   template <typename Message>
   void Subscribe(const std::string& channel, std::function<void(const Message&)> handler, int queue = 100) {
-    subscriptions_.push_back(&bus_.Subscribe<Message>(channel, std::move(handler), queue));
+    subscriptions_.push_back({channel, &bus_.Subscribe<Message>(channel, std::move(handler), queue), 0});
+  }
+  // For channels on which one process speaks and time never goes back: older messages are refused, unless they are so old that
+  // their sender must have been started again, or a log is played.
+  template <typename Message>
+  void SubscribeInOrder(const std::string& channel, std::function<void(const Message&)> handler, int queue = 100) {
+    Subscribe<Message>(
+        channel,
+        [this, channel, handler = std::move(handler)](const Message& message) {
+          if (InOrder(channel, message.utime)) handler(message);
+        },
+        queue);
+  }
+  // Publishes what was made of something captured at message.utime, and notes how long that took.
+  template <typename Message>
+  void PublishDerived(const std::string& channel, const Message& message) {
+    latencies_ms_[channel].push_back(1e-3 * static_cast<double>(bus_.now_us() - message.utime));
+    bus_.Publish(channel, message);
   }
   // A message whose values are out of range.
   void Refuse(const std::string& channel, const std::string& why);
@@ -65,21 +83,32 @@ class Node {
     std::int64_t total = 0;
     std::int64_t total_at_last_status = 0;
   };
+  struct Subscribed {
+    std::string channel;
+    const SubscriptionCounts* counts;
+    std::int64_t bad_seen;
+  };
 
+  bool InOrder(const std::string& channel, std::int64_t utime);
   void CollectSubscriptionErrors();
+  void SetCount(const std::string& counter, std::int64_t total);
 
   std::string process_;
-  std::vector<const SubscriptionCounts*> subscriptions_;
-  std::vector<std::int64_t> bad_seen_;
+  std::vector<Subscribed> subscriptions_;
+  std::map<std::string, std::int64_t> refused_by_channel_;
+  std::map<std::string, std::int64_t> newest_utime_;         // Of channels that are in order.
+  std::map<std::string, std::vector<double>> latencies_ms_;  // Since the last status.
   std::map<std::string, Counter> counters_;
   std::int64_t started_us_ = 0;
   std::int64_t last_status_us_ = 0;
-  std::int64_t refused_ = 0;
   std::int64_t bad_frames_ = 0;
   std::int64_t gaps_ = 0;
   std::int64_t skipped_ = 0;
   std::string last_error_;
   std::int64_t last_error_us_ = 0;
+  std::string last_said_;
+  std::int64_t last_said_us_ = 0;
+  std::int64_t unsaid_ = 0;
 };
 
 }  // namespace vantage::messaging

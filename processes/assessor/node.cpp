@@ -85,8 +85,8 @@ AssessorNode::AssessorNode(messaging::Bus& bus, const AssessorNodeParams& params
       rule_(measures::CompletenessRuleFromString(params.rule)),
       frames_(bus),
       worker_(MakeWorkerParams(params)) {
-  Subscribe<track_t>(messaging::kLearnerTrack, [this](const track_t& message) { OnTrack(message); });
-  Subscribe<view_t>(messaging::kLearnerView, [this](const view_t& message) { OnView(message); });
+  SubscribeInOrder<track_t>(messaging::kLearnerTrack, [this](const track_t& message) { OnTrack(message); });
+  SubscribeInOrder<view_t>(messaging::kLearnerView, [this](const view_t& message) { OnView(message); });
   Subscribe<reach_t>(messaging::kPlannerReach, [this](const reach_t& message) { OnReach(message); });
   Subscribe<query_t>(messaging::kAssessorQuery, [this](const query_t& message) { OnQuery(message); });
 }

@@ -9,6 +9,7 @@
 
 #include "common/params.h"
 #include "messaging/channels.h"
+#include "messaging/mount_messages.h"
 
 namespace vantage::learner {
 namespace {
@@ -61,8 +62,12 @@ LearnerNode::LearnerNode(messaging::Bus& bus, const LearnerNodeParams& params)
     if (!measures) return Refuse(messaging::kAssessorMeasures, measures.error);
     OnMeasures(*measures);
   });
-  Subscribe<mount_state_t>(messaging::kMountState, [this](const mount_state_t& message) {
-    if (message.moving) moved_until_us_ = std::max(moved_until_us_, message.utime);
+  SubscribeInOrder<mount_state_t>(messaging::kMountState, [this](const mount_state_t& message) {
+    const auto state = messaging::FromMessage(message);
+    if (!state) return Refuse(messaging::kMountState, state.error);
+    if (state->utime < mount_us_) moved_until_us_ = 0;  // It was started again, or its clock was set.
+    mount_us_ = state->utime;
+    if (state->moving) moved_until_us_ = std::max(moved_until_us_, state->utime);
   });
   Subscribe<operator_command_t>(messaging::kOperatorCommand, [this](const operator_command_t& message) {
     if (!message.process.empty() && message.process != process()) return;
@@ -170,7 +175,7 @@ void LearnerNode::Process(const messaging::ReceivedFrame& received) {
   last_.points = object ? static_cast<int>(object->points.size()) : 0;
   unsaved_ |= last_.result.view_added || last_.result.refined;
   NoteScene(received.frame, last_.result.view_added);
-  bus_.Publish(messaging::kLearnerTrack, messaging::ToMessage(last_));
+  PublishDerived(messaging::kLearnerTrack, messaging::ToMessage(last_));
   StoreViews();
 }
 
@@ -183,7 +188,7 @@ void LearnerNode::StoreViews() {
   if (newest == announced_view_) return;
   announced_view_ = newest;
   Count("views");
-  bus_.Publish(messaging::kLearnerView, messaging::ToMessage(messaging::NewestView(*object, params_.store)));
+  PublishDerived(messaging::kLearnerView, messaging::ToMessage(messaging::NewestView(*object, params_.store)));
 }
 
 void LearnerNode::NoteScene(const rgbd::Frame& frame, bool view_added) {

@@ -69,6 +69,7 @@ class LearnerNode : public messaging::Node {
   messaging::Track last_;
   std::optional<messaging::ObjectMeasures> saved_measures_;
   bool paused_ = false;
+  std::int64_t mount_us_ = 0;        // Of the mount's newest state.
   std::int64_t moved_until_us_ = 0;  // The mount was moving at this time and before; no mount: never.
 };
 

@@ -42,19 +42,19 @@ PlannerNode::PlannerNode(messaging::Bus& bus, const PlannerNodeParams& params)
   status_.state = "waiting";
   status_.target_completeness = params_.planner.target_completeness;
   waiting_since_us_ = now_us();
-  Subscribe<mount_state_t>(messaging::kMountState, [this](const mount_state_t& message) {
+  SubscribeInOrder<mount_state_t>(messaging::kMountState, [this](const mount_state_t& message) {
     const auto state = messaging::FromMessage(message);
     if (!state) return Refuse(messaging::kMountState, state.error);
     mount_state_ = *state;
     mount_heard_us_ = now_us();
   });
-  Subscribe<scene_t>(messaging::kLearnerScene, [this](const scene_t& message) {
+  SubscribeInOrder<scene_t>(messaging::kLearnerScene, [this](const scene_t& message) {
     const auto scene = messaging::FromMessage(message);
     if (!scene) return Refuse(messaging::kLearnerScene, scene.error);
     scene_ = *scene;
   });
-  Subscribe<track_t>(messaging::kLearnerTrack, [this](const track_t& message) { OnTrack(message); });
-  Subscribe<view_t>(messaging::kLearnerView, [this](const view_t& message) { OnView(message); });
+  SubscribeInOrder<track_t>(messaging::kLearnerTrack, [this](const track_t& message) { OnTrack(message); });
+  SubscribeInOrder<view_t>(messaging::kLearnerView, [this](const view_t& message) { OnView(message); });
   Subscribe<measures_t>(messaging::kAssessorMeasures, [this](const measures_t& message) { OnMeasures(message); });
   Subscribe<completeness_t>(messaging::kAssessorCompleteness, [this](const completeness_t& message) { OnCompleteness(message); });
   Subscribe<operator_command_t>(messaging::kOperatorCommand, [this](const operator_command_t& message) {
@@ -280,7 +280,7 @@ void PlannerNode::EndAttempt(bool reached) {
   status_.views = views();
   const std::string outcome = attempt.view_added ? "view added" : reached ? look_.note : "the mount refuses to go there";
   std::fprintf(stderr, "%6.1f s  attempt %d: %s; %d views, completeness %.3f before it\n", ElapsedSince(first_decision_us_),
-              status_.attempts, outcome.c_str(), views(), status_.completeness);
+               status_.attempts, outcome.c_str(), views(), status_.completeness);
   Wait("the next decision");
 }
 
@@ -292,9 +292,9 @@ void PlannerNode::Finish(const std::string& reason) {
   status_.stop_reason = reason;
   status_.views = views();
   std::fprintf(stderr, "%6.1f s  stopped: %s%s; %d views, completeness %.3f\n",
-              first_decision_us_ > 0 ? ElapsedSince(first_decision_us_) : 0.0, reason.c_str(),
-              status_.decision == 0 && !waiting_for_.empty() ? (" (waited for " + waiting_for_ + ")").c_str() : "", views(),
-              status_.completeness);
+               first_decision_us_ > 0 ? ElapsedSince(first_decision_us_) : 0.0, reason.c_str(),
+               status_.decision == 0 && !waiting_for_.empty() ? (" (waited for " + waiting_for_ + ")").c_str() : "", views(),
+               status_.completeness);
   Publish();
   WriteSummary();
 }

@@ -93,7 +93,7 @@ void RecogniserNode::Recognise(const messaging::ReceivedFrame& received) {
   detections.process_ms = stopwatch.ms();
   Count("frames");
   Count("detections", static_cast<std::int64_t>(detections.detections.size()));
-  bus_.Publish(messaging::kRecogniserDetections, messaging::ToMessage(detections));
+  PublishDerived(messaging::kRecogniserDetections, messaging::ToMessage(detections));
 }
 
 }  // namespace vantage::recogniser

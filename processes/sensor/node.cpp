@@ -34,7 +34,7 @@ SensorNode::SensorNode(messaging::Bus& bus, std::unique_ptr<FrameSource> source,
     : Node(bus, "sensor"), params_(params), source_(std::move(source)), sender_(bus, params.sender) {
   params_.Check();
   next_frame_us_ = now_us() + static_cast<std::int64_t>(params_.start_delay_s * 1e6);
-  Subscribe<mount_state_t>(messaging::kMountState, [this](const mount_state_t& message) {
+  SubscribeInOrder<mount_state_t>(messaging::kMountState, [this](const mount_state_t& message) {
     const auto state = messaging::FromMessage(message);
     if (!state) return Refuse(messaging::kMountState, state.error);
     T_world_camera_ = state->T_world_camera();

@@ -233,6 +233,10 @@ Rows ToRows(const status_t& m) {
   for (const auto& counter : m.counters) {
     counters += (counters.empty() ? "" : "; ") + counter.name + " " + std::to_string(counter.total);
   }
+  std::string latencies;
+  for (const auto& latency : m.latencies) {
+    latencies += (latencies.empty() ? "" : "; ") + latency.channel + " " + std::to_string(latency.median_ms);
+  }
   return {Begin(m.utime)
               .Add("process", m.process)
               .Add("state", m.state)
@@ -242,7 +246,8 @@ Rows ToRows(const status_t& m) {
               .Add("skipped", m.skipped)
               .Add("bad", m.bad)
               .Add("last_error", m.last_error)
-              .Add("counters", counters)};
+              .Add("counters", counters)
+              .Add("median_latency_ms", latencies)};
 }
 
 template <typename Message>

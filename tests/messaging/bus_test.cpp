@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <thread>
 #include <vantage/object_prior_t.hpp>
 #include <vantage/operator_command_t.hpp>
@@ -125,9 +126,78 @@ TEST(RunNodes, EndsWhenTheNodesAreFinishedAndReportsStatus) {
   EXPECT_EQ(last.process, "counter");
   EXPECT_EQ(last.bad, 1);
   EXPECT_EQ(last.last_error, "OBJECT_PRIOR: probability above 1");
-  ASSERT_EQ(last.counters.size(), 1u);
-  EXPECT_EQ(last.counters[0].name, "priors");
-  EXPECT_EQ(last.counters[0].total, 3);
+  ASSERT_EQ(last.counters.size(), 2u);
+  EXPECT_EQ(last.counters[0].name, "bad OBJECT_PRIOR");
+  EXPECT_EQ(last.counters[0].total, 1);
+  EXPECT_EQ(last.counters[1].name, "priors");
+  EXPECT_EQ(last.counters[1].total, 3);
+}
+
+// Takes priors in order, and passes on what they made it think.
+class OrderedNode : public Node {
+ public:
+  explicit OrderedNode(Bus& bus) : Node(bus, "ordered") {
+    SubscribeInOrder<object_prior_t>(kObjectPrior, [this](const object_prior_t& m) {
+      heard.push_back(m.utime);
+      PublishDerived("THOUGHT", m);
+    });
+  }
+  void Step() override {}
+  std::vector<std::int64_t> heard;
+};
+
+TEST(Node, OlderMessagesAreRefusedUnlessTheSenderBeganAnew) {
+  std::int64_t now_us = 100000000;
+  Bus bus("memq://", [&] { return now_us; });
+  OrderedNode node(bus);
+  const auto hear = [&](std::int64_t utime) {
+    object_prior_t prior = Prior(0.5);
+    prior.utime = utime;
+    bus.Publish(kObjectPrior, prior);
+    bus.Drain();
+  };
+  for (const std::int64_t utime : {20000000, 20000000, 19999999, 15000000, 14999999, 15000000, 14000000}) hear(utime);
+  EXPECT_EQ(node.heard, (std::vector<std::int64_t>{20000000, 20000000, 14999999, 15000000}));
+  EXPECT_EQ(node.bad(), 3);
+}
+
+TEST(Node, WarningsAreOneASecond) {
+  std::int64_t now_us = 1000000;
+  Bus bus("memq://", [&] { return now_us; });
+  CountingNode node(bus);
+  ::testing::internal::CaptureStderr();
+  for (int i = 0; i < 500; ++i) {
+    node.NoteError("error " + std::to_string(i));
+    now_us += 10000;
+  }
+  const std::string said = ::testing::internal::GetCapturedStderr();
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 5) << said;
+  EXPECT_NE(said.find("error 100 (and 99 other warnings before it)"), std::string::npos) << said;
+  EXPECT_EQ(node.last_error(), "error 499");
+}
+
+TEST(Node, TheStatusSaysHowOldWhatWasPublishedIs) {
+  std::int64_t now_us = 10000000;
+  Bus bus("memq://", [&] { return now_us; });
+  OrderedNode node(bus);
+  status_t last;
+  bus.Subscribe<status_t>("ORDERED_STATUS", [&](const status_t& status) { last = status; });
+  for (const std::int64_t utime : {9900000, 9950000, 9980000}) {
+    object_prior_t prior = Prior(0.5);
+    prior.utime = utime;
+    bus.Publish(kObjectPrior, prior);
+  }
+  bus.Drain();
+  node.PublishStatus();
+  bus.Drain();
+  ASSERT_EQ(last.latencies.size(), 1u);
+  EXPECT_EQ(last.latencies[0].channel, "THOUGHT");
+  EXPECT_EQ(last.latencies[0].messages, 3);
+  EXPECT_EQ(last.latencies[0].median_ms, 50.0);
+  EXPECT_EQ(last.latencies[0].max_ms, 100.0);
+  node.PublishStatus();
+  bus.Drain();
+  EXPECT_EQ(last.latencies[0].messages, 0);
 }
 
 TEST(RunNodes, ASignalEndsTheWaitAtOnce) {

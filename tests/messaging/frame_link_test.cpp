@@ -202,5 +202,57 @@ TEST(FrameLink, ParametersAreChecked) {
   EXPECT_THROW(FrameSender(bus, params), std::invalid_argument);
 }
 
+TEST(FrameLink, LossesAreCountedForEveryChannel) {
+  std::vector<rgbd::Frame> frames;
+  for (int i = 1; i <= 5; ++i) frames.push_back(NoiseFrame(64, 48, i * 1000));
+  Bus bus("memq://");
+  FrameReceiver receiver(bus);
+  for (const auto& [channel, part] : PartsOf(frames)) {
+    const bool lost =
+        (channel == kSensorColor && part.sequence == 1) || (channel == kSensorDepth && part.sequence >= 1 && part.sequence <= 2);
+    if (!lost) bus.Publish(channel, part);
+  }
+  bus.Drain();
+  EXPECT_EQ(receiver.lost_colors(), 1);
+  EXPECT_EQ(receiver.lost_depths(), 2);
+  EXPECT_EQ(receiver.gaps(), 2);
+  EXPECT_EQ(receiver.frames(), 3);
+}
+
+TEST(FrameLink, WhatClaimsToBeOfTheFutureDoesNotStopTheOthers) {
+  Bus bus("memq://");
+  FrameReceiver receiver(bus);
+  const auto hostile = PartsOf({NoiseFrame(640, 480, 1)});
+  for (int i = 0; i < 40; ++i) {  // Whole images without their other half, and halves of images.
+    for (auto [channel, part] : hostile) {
+      if (i % 2 == 0 && (channel == kSensorDepth || part.part > 0)) continue;
+      if (i % 2 == 1 && channel == kSensorDepth) continue;
+      part.utime = 4000000000000000000 + i;
+      bus.Publish(channel, part);
+    }
+  }
+  bus.Drain();
+  for (int i = 1; i <= 3; ++i) FrameSender(bus).Send(NoiseFrame(640, 480, i * 1000));
+  bus.Drain();
+  EXPECT_EQ(receiver.frames(), 3);
+  EXPECT_TRUE(receiver.Take());
+}
+
+TEST(FrameLink, PartsThatMakeMoreThanTheirImageAreRefused) {
+  auto parts = PartsOf({NoiseFrame(640, 480, 1)});
+  Bus bus("memq://");
+  FrameReceiver receiver(bus);
+  for (int i = 0; i < 20; ++i) {
+    auto [channel, part] = parts[0];
+    part.parts = 30000;
+    part.part = static_cast<std::int16_t>(i);
+    part.total_size = part.size * 2;
+    bus.Publish(channel, part);
+  }
+  bus.Drain();
+  EXPECT_GE(receiver.bad_colors(), 6);
+  EXPECT_EQ(receiver.bad_depths(), 0);
+}
+
 }  // namespace
 }  // namespace vantage::messaging
