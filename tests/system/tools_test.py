@@ -1,0 +1,118 @@
+"""Tests of scripts/doctor and scripts/spy. usage: tools_test.py TEST FOLDER_OF_PROGRAMS; runs in a network of its own (in_network)."""
+import os
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+BIN = Path(sys.argv[2]).resolve()
+os.environ["VANTAGE_BIN"] = str(BIN)
+
+
+def check(condition, text):
+    if not condition:
+        raise AssertionError(text)
+
+
+def doctor(*before):
+    done = subprocess.run([*before, ROOT / "scripts" / "doctor"], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
+    print(done.stdout)
+    return done.returncode, done.stdout
+
+
+def line_of(report, what):
+    return next((line for line in report.splitlines() if line[5:].startswith(what)), "")
+
+
+def test_doctor(_):
+    """Where all is there it finds nothing bad; without a route it says so, and what it says to do mends it."""
+    _, report = doctor()
+    for what in ("multicast route", "loopback", "OpenNI2", "disk"):
+        check(line_of(report, what).startswith("ok"), f"{what}: {line_of(report, what)}")
+    for what in ("packages", "socket buffer", "lcm-spy", "programs"):
+        check(line_of(report, what), f"nothing is said of {what}")
+
+    subprocess.run(["ip", "route", "del", "224.0.0.0/4", "dev", "lo"], check=True)
+    code, report = doctor()
+    check(code == 1 and line_of(report, "multicast route").startswith("BAD"), "a missing route is not found")
+    mend = re.search(r"mend: (.*?)   \(", report[report.index("multicast route"):]).group(1)
+    subprocess.run(["sh", "-c", mend], check=True)
+    _, report = doctor()
+    check(line_of(report, "multicast route").startswith("ok"), "what it said did not mend it")
+    check(line_of(report, "loopback").startswith("ok"), "what it said did not mend the loopback")
+
+
+def read_xwd(file):
+    """(width, height, rows of 32-bit pixels) of the picture that Xvfb keeps in a file."""
+    data = file.read_bytes()
+    header = struct.unpack(">25I", data[:100])
+    width, height, line, colors = header[4], header[5], header[12], header[19]
+    begin = header[0] + 12 * colors
+    return width, height, [data[begin + y * line:begin + y * line + 4 * width] for y in range(height)]
+
+
+def lines_of_text(rows, left, right):
+    """How many lines of text there are between two columns: bands of rows with dark pixels."""
+    def dark(row):
+        return sum(row[4 * x] < 100 and row[4 * x + 1] < 100 and row[4 * x + 2] < 100 for x in range(left, right)) >= 4
+    lines, inside = 0, False
+    for row in rows:
+        now = dark(row)
+        lines += now and not inside
+        inside = now
+    return lines
+
+
+def wait_for(condition, what, timeout_s=60.0):
+    deadline = time.monotonic() + timeout_s
+    while time.monotonic() < deadline:
+        if condition():
+            return
+        time.sleep(0.5)
+    raise AssertionError(f"waited {timeout_s:.0f} s for {what}")
+
+
+def test_spy(folder):
+    """lcm-spy starts on today's Java, knows every type of ours and shows the channels of a running sensor."""
+    os.environ["DISPLAY"] = ":77"
+    os.environ["VANTAGE_SPY_FOLDER"] = str(folder / "types")
+    world = ROOT / "config" / "worlds" / "table.yaml"
+    picture = folder / "Xvfb_screen0"
+    words = folder / "spy.log"
+    running = []
+    try:
+        running.append(subprocess.Popen(["Xvfb", ":77", "-screen", "0", "1000x700x24", "-fbdir", folder, "-nolisten", "tcp"],
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        wait_for(picture.is_file, "the display")
+        with open(words, "w") as log:
+            running.append(subprocess.Popen([ROOT / "scripts" / "spy"], stdout=log, stderr=subprocess.STDOUT))
+        wait_for(lambda: "plugins" in words.read_text() or running[-1].poll() is not None, "lcm-spy")
+        types = len(list((ROOT / "lcmtypes").glob("vantage_*.lcm")))
+        check(f"Found {types} LCM types" in words.read_text(), f"not {types} types: {words.read_text()}")
+        time.sleep(3.0)
+        quiet = lines_of_text(read_xwd(picture)[2][20:560], 165, 320)
+        for name in ("sensor", "mount"):
+            running.append(subprocess.Popen([BIN / name, "--world", world]))
+        # Type names of SENSOR_COLOR, SENSOR_DEPTH, SENSOR_STATUS, MOUNT_STATE, MOUNT_STATUS.
+        wait_for(lambda: lines_of_text(read_xwd(picture)[2][20:560], 165, 320) == 5, "five channels on the screen")
+        check(quiet == 0, f"{quiet} lines before anybody spoke")
+        save = os.environ.get("VANTAGE_SAVE")
+        if save:
+            Path(save).write_bytes(picture.read_bytes())
+    finally:
+        print(words.read_text() if words.is_file() else "")
+        for process in reversed(running):
+            process.terminate()
+            process.wait(20)
+
+
+def main():
+    with tempfile.TemporaryDirectory(prefix="vantage-") as folder:
+        globals()[f"test_{sys.argv[1]}"](Path(folder))
+
+
+main()
