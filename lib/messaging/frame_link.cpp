@@ -1,8 +1,10 @@
 #include "messaging/frame_link.h"
 
 #include <algorithm>
+#include <chrono>
 #include <limits>
 #include <stdexcept>
+#include <thread>
 
 #include "messaging/channels.h"
 #include "messaging/geometry_messages.h"
@@ -39,8 +41,24 @@ std::int64_t Missed(std::int64_t last, std::int64_t sequence) {
 }
 
 bool EncodingBelongs(std::int8_t encoding, bool is_depth) {
-  if (is_depth) return encoding == image_part_t::DEPTH_RVL;
-  return encoding == image_part_t::JPEG || encoding == image_part_t::PNG;
+  if (is_depth) return encoding == image_part_t::DEPTH_RVL || encoding == image_part_t::RAW_DEPTH;
+  return encoding == image_part_t::JPEG || encoding == image_part_t::PNG || encoding == image_part_t::RAW_BGR;
+}
+
+std::vector<std::uint8_t> RawBytes(const cv::Mat& image) {
+  const cv::Mat rows = image.isContinuous() ? image : image.clone();
+  return {rows.data, rows.data + rows.total() * rows.elemSize()};
+}
+
+cv::Mat FromRaw(const std::vector<std::uint8_t>& bytes, const geometry::PinholeCamera& camera, int type) {
+  const std::size_t expected =
+      static_cast<std::size_t>(camera.height) * static_cast<std::size_t>(camera.width) * CV_ELEM_SIZE(type);
+  if (bytes.size() != expected) {
+    throw std::runtime_error("a raw image of " + std::to_string(bytes.size()) + " bytes instead of " + std::to_string(expected));
+  }
+  cv::Mat image(camera.height, camera.width, type);
+  std::copy(bytes.begin(), bytes.end(), image.data);
+  return image;
 }
 
 Result<rgbd::Frame> Decode(const EncodedImage& color, const EncodedImage& depth) {
@@ -58,8 +76,12 @@ Result<rgbd::Frame> Decode(const EncodedImage& color, const EncodedImage& depth)
     frame.T_world_camera = *pose;
   }
   try {
-    frame.color = rgbd::DecodeColor(color.bytes);
-    if (!depth.bytes.empty()) frame.depth = rgbd::DecodeDepth(depth.bytes);
+    const bool raw_color = color.header.encoding == image_part_t::RAW_BGR;
+    frame.color = raw_color ? FromRaw(color.bytes, *camera, CV_8UC3) : rgbd::DecodeColor(color.bytes);
+    if (!depth.bytes.empty()) {
+      const bool raw_depth = depth.header.encoding == image_part_t::RAW_DEPTH;
+      frame.depth = raw_depth ? FromRaw(depth.bytes, *camera, CV_16UC1) : rgbd::DecodeDepth(depth.bytes);
+    }
     rgbd::CheckFrame(frame);
   } catch (const std::exception& error) {
     return Frame::Error(error.what());
@@ -97,9 +119,13 @@ void FrameSenderParams::Check() const {
   if (max_part_bytes < 1000 || max_part_bytes > kMaxMessageBytes - 1000) {
     throw std::invalid_argument("max_part_bytes must be in [1000, " + std::to_string(kMaxMessageBytes - 1000) + "]");
   }
+  if (pace_us < 0 || pace_us > 10000) throw std::invalid_argument("pace_us must be in [0, 10000]");
 }
 
-FrameSender::FrameSender(Bus& bus, const FrameSenderParams& params) : bus_(bus), params_(params) { params_.Check(); }
+FrameSender::FrameSender(Bus& bus, const FrameSenderParams& params)
+    : bus_(bus), params_(params), over_network_(bus.url().rfind("udpm", 0) == 0) {
+  params_.Check();
+}
 
 std::int64_t FrameSender::Send(const rgbd::Frame& frame) {
   rgbd::CheckFrame(frame);
@@ -112,17 +138,20 @@ std::int64_t FrameSender::Send(const rgbd::Frame& frame) {
   header.T_world_camera_known = frame.T_world_camera.has_value();
   header.T_world_camera = ToMessage(frame.T_world_camera.value_or(geometry::Rigid::Identity()));
 
-  header.encoding = image_part_t::JPEG;
-  for (const auto& part : SplitImage(header, rgbd::EncodeColor(frame.color, params_.jpeg_quality), params_.max_part_bytes)) {
-    bus_.Publish(kSensorColor, part);
-  }
+  header.encoding = params_.raw ? image_part_t::RAW_BGR : image_part_t::JPEG;
+  SendImage(kSensorColor, header, params_.raw ? RawBytes(frame.color) : rgbd::EncodeColor(frame.color, params_.jpeg_quality));
   if (header.with_depth) {
-    header.encoding = image_part_t::DEPTH_RVL;
-    for (const auto& part : SplitImage(header, rgbd::EncodeDepth(frame.depth), params_.max_part_bytes)) {
-      bus_.Publish(kSensorDepth, part);
-    }
+    header.encoding = params_.raw ? image_part_t::RAW_DEPTH : image_part_t::DEPTH_RVL;
+    SendImage(kSensorDepth, header, params_.raw ? RawBytes(frame.depth) : rgbd::EncodeDepth(frame.depth));
   }
   return header.sequence;
+}
+
+void FrameSender::SendImage(const std::string& channel, const image_part_t& header, const std::vector<std::uint8_t>& bytes) {
+  for (const auto& part : SplitImage(header, bytes, params_.max_part_bytes)) {
+    bus_.Publish(channel, part);
+    if (params_.pace_us > 0 && over_network_) std::this_thread::sleep_for(std::chrono::microseconds(params_.pace_us));
+  }
 }
 
 std::vector<image_part_t> SplitImage(const image_part_t& header, const std::vector<std::uint8_t>& bytes, int max_part_bytes) {
@@ -268,6 +297,7 @@ std::optional<ReceivedFrame> FrameReceiver::Take() {
     Refuse(color_, "frame " + std::to_string(encoded.color.header.sequence) + ": " + frame.error);
     return std::nullopt;
   }
+  if (encoded.color.header.encoding == image_part_t::RAW_BGR) encoded.color.bytes.clear();
   return ReceivedFrame{std::move(*frame), encoded.color.header.sequence, std::move(encoded.color.bytes)};
 }
 

@@ -25,6 +25,8 @@ std::string WhyNotAPart(const image_part_t& part);
 struct FrameSenderParams {
   int jpeg_quality = 92;        // 1..100.
   int max_part_bytes = 180000;  // Of image data per message; in [1000, kMaxMessageBytes - 1000].
+  int pace_us = 0;              // Between the messages of a frame, where they go over a network; in [0, 10000].
+  bool raw = false;             // Images as they are, 1.5 MB a frame: nothing is lost in JPEG, the kernel needs raised limits.
 
   void Check() const;  // Throws std::invalid_argument naming the field.
 };
@@ -39,8 +41,11 @@ class FrameSender {
   std::int64_t Send(const rgbd::Frame& frame);
 
  private:
+  void SendImage(const std::string& channel, const image_part_t& header, const std::vector<std::uint8_t>& bytes);
+
   Bus& bus_;
   FrameSenderParams params_;
+  bool over_network_;
   std::int64_t next_sequence_ = 0;
 };
 
@@ -78,7 +83,7 @@ class ImageAssembler {
 struct ReceivedFrame {
   rgbd::Frame frame;  // id: the source's frame number.
   std::int64_t sequence = 0;
-  std::vector<std::uint8_t> encoded_color;  // The JPEG or PNG it came as.
+  std::vector<std::uint8_t> encoded_color;  // The JPEG or PNG it came as; empty where it came raw.
 };
 
 // A message older than the newest by at most this is late; by more, and its sender was started again, or a log is played.

@@ -26,28 +26,43 @@ void CheckSides(const char* codec, std::uint32_t width, std::uint32_t height) {
                       std::to_string(width) + "x" + std::to_string(height));
 }
 
-// Numbers as 4-bit pieces: 3 bits, lowest first, and a bit that says whether more follow.
+// Numbers as 4-bit pieces: 3 bits, lowest first, and a bit that says whether more follow. Eight are gathered before they are
+// stored; with the at most nine of a number they fit into 64 bits.
 class PieceWriter {
  public:
-  explicit PieceWriter(Bytes& bytes) : bytes_(bytes) {}
+  explicit PieceWriter(Bytes& bytes) : bytes_(bytes), used_(bytes.size()) {}
 
+  // Makes room for so many numbers.
+  void Reserve(std::size_t numbers) {
+    const std::size_t needed = used_ + 5 * numbers + 8;
+    if (bytes_.size() < needed) bytes_.resize(std::max(needed, 2 * bytes_.size()));
+  }
   void Write(std::uint32_t value) {
-    do {
-      const std::uint32_t low = value & 7u;
-      value >>= 3;
-      Put(static_cast<std::uint8_t>(value ? low | 8u : low));
-    } while (value);
+    for (; value > 7u; value >>= 3) Put((value & 7u) | 8u);
+    Put(value);
+    for (; pieces_ >= 8; pieces_ -= 8) {
+      const std::uint64_t word = word_ >> (4 * (pieces_ - 8));
+      for (int i = 0; i < 4; ++i) bytes_[used_ + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(word >> (24 - 8 * i));
+      used_ += 4;
+    }
+  }
+  // Stores what is left and cuts what was reserved too much; to be called once, at the end.
+  void Finish() {
+    bytes_.resize(used_);
+    for (; pieces_ >= 2; pieces_ -= 2) bytes_.push_back(static_cast<std::uint8_t>(word_ >> (4 * (pieces_ - 2))));
+    if (pieces_ == 1) bytes_.push_back(static_cast<std::uint8_t>(word_ << 4));
   }
 
  private:
-  void Put(std::uint8_t piece) {
-    if (half_) bytes_.back() = static_cast<std::uint8_t>(bytes_.back() | piece);
-    if (!half_) bytes_.push_back(static_cast<std::uint8_t>(piece << 4));
-    half_ = !half_;
+  void Put(std::uint32_t piece) {
+    word_ = word_ << 4 | piece;
+    ++pieces_;
   }
 
   Bytes& bytes_;
-  bool half_ = false;
+  std::size_t used_;
+  std::uint64_t word_ = 0;  // The newest piece lowest.
+  int pieces_ = 0;
 };
 
 class PieceReader {
@@ -77,12 +92,11 @@ class PieceReader {
 };
 
 std::uint32_t ZigZag(std::int32_t value) {
-  return value < 0 ? 2u * static_cast<std::uint32_t>(-value) - 1u : 2u * static_cast<std::uint32_t>(value);
+  return (static_cast<std::uint32_t>(value) << 1) ^ static_cast<std::uint32_t>(value >> 31);
 }
 
 std::int32_t UnZigZag(std::uint32_t value) {
-  const auto half = static_cast<std::int32_t>(value / 2);
-  return value % 2 ? -half - 1 : half;
+  return static_cast<std::int32_t>(value >> 1) ^ -static_cast<std::int32_t>(value & 1u);
 }
 
 void PutUint32(Bytes& bytes, std::uint32_t value) {
@@ -191,12 +205,15 @@ Bytes EncodeDepth(const cv::Mat& depth) {
   while (at != end) {
     const std::uint16_t* run = at;
     while (at != end && *at == 0) ++at;
+    writer.Reserve(2);
     writer.Write(static_cast<std::uint32_t>(at - run));
     run = at;
     while (at != end && *at != 0) ++at;
     writer.Write(static_cast<std::uint32_t>(at - run));
+    writer.Reserve(static_cast<std::size_t>(at - run));
     for (; run != at; previous = *run++) writer.Write(ZigZag(*run - previous));
   }
+  writer.Finish();
   return bytes;
 }
 

@@ -24,6 +24,8 @@ SensorNodeParams LoadSensorNodeParams(const std::string& file) {
   auto sender = yaml.Child("sender");
   sender.Get("jpeg_quality", params.sender.jpeg_quality);
   sender.Get("max_part_bytes", params.sender.max_part_bytes);
+  sender.Get("pace_us", params.sender.pace_us);
+  sender.Get("raw", params.sender.raw);
   sender.Finish();
   yaml.Finish();
   yaml.Check(params);

@@ -73,6 +73,33 @@ TEST(FrameLink, AFrameArrivesWholeInPartsThatAreSmallEnough) {
   EXPECT_EQ(receiver.gaps(), 0);
 }
 
+TEST(FrameLink, RawFramesArriveAsTheyAre) {
+  auto frame = NoiseFrame(64, 48, 1000000);
+  Bus bus("memq://");
+  FrameReceiver receiver(bus);
+  Tap tap(bus);
+  FrameSenderParams params;
+  params.raw = true;
+  params.max_part_bytes = 5000;
+  FrameSender(bus, params).Send(frame);
+  bus.Drain();
+  const auto received = receiver.Take();
+  ASSERT_TRUE(received) << receiver.last_error();
+  EXPECT_EQ(cv::norm(received->frame.color, frame.color, cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(received->frame.depth, frame.depth, cv::NORM_INF), 0.0);
+  EXPECT_TRUE(received->encoded_color.empty());
+
+  image_part_t short_one = tap.parts[0].second;  // Fewer bytes than the image has.
+  short_one.utime += 1000;
+  short_one.parts = 1;
+  short_one.total_size = short_one.size;
+  short_one.with_depth = false;
+  bus.Publish(kSensorColor, short_one);
+  bus.Drain();
+  EXPECT_FALSE(receiver.Take());
+  EXPECT_NE(receiver.last_error().find("raw image"), std::string::npos) << receiver.last_error();
+}
+
 TEST(FrameLink, FramesWithoutDepthNeedNone) {
   Bus bus("memq://");
   FrameReceiver receiver(bus);
