@@ -240,6 +240,10 @@ void FrameReceiver::OnPart(const image_part_t& part, Half& half) {
 
   auto image = half.parts.Add(part);
   if (!image) return Refuse(half, image.error);
+  for (std::int64_t* last : {&half.last_sequence, &last_sequence_}) {
+    if (*last < 0) *last = part.sequence;
+  }
+  half.newest_sequence = part.sequence;
   if (!*image) return;
   half.lost += Missed(half.last_sequence, part.sequence);
   half.last_sequence = part.sequence;
@@ -248,11 +252,17 @@ void FrameReceiver::OnPart(const image_part_t& part, Half& half) {
   Pair(part.utime);
 }
 
+std::int64_t FrameReceiver::Half::AllLost() const { return lost + Missed(last_sequence, newest_sequence); }
+
+std::int64_t FrameReceiver::gaps() const {
+  return gaps_ + Missed(last_sequence_, std::max(color_.newest_sequence, depth_.newest_sequence));
+}
+
 void FrameReceiver::Restart() {
   for (Half* half : {&color_, &depth_}) {
     half->parts.DropUntil(std::numeric_limits<std::int64_t>::max());
     half->whole.clear();
-    half->last_sequence = -1;
+    half->last_sequence = half->newest_sequence = -1;
   }
   last_sequence_ = -1;
   last_utime_ = 0;

@@ -106,15 +106,15 @@ class FrameReceiver {
   // Forgets what Take would return; not counted as skipped.
   void Drop() { newest_.reset(); }
 
-  std::int64_t frames() const { return frames_; }                   // Whole ones that arrived.
-  std::int64_t gaps() const { return gaps_; }                       // Frames that did not arrive whole.
-  std::int64_t skipped() const { return skipped_; }                 // Replaced by a newer one before they were taken.
+  std::int64_t frames() const { return frames_; }    // Whole ones that arrived.
+  std::int64_t gaps() const;                         // Frames that did not arrive whole, of those after the first part.
+  std::int64_t skipped() const { return skipped_; }  // Replaced by a newer one before they were taken.
   std::int64_t bad() const { return bad_colors() + bad_depths(); }  // Messages refused, frames that could not be decoded.
   std::int64_t bad_colors() const { return color_.refused + color_.counts->bad; }
   std::int64_t bad_depths() const { return depth_.refused + depth_.counts->bad; }
   // Images of either channel that did not arrive whole, by the sequence numbers of those that did.
-  std::int64_t lost_colors() const { return color_.lost; }
-  std::int64_t lost_depths() const { return depth_.lost; }
+  std::int64_t lost_colors() const { return color_.AllLost(); }
+  std::int64_t lost_depths() const { return depth_.AllLost(); }
   std::string last_error() const;
 
  private:
@@ -132,10 +132,14 @@ class FrameReceiver {
     std::string channel;
     ImageAssembler parts;
     std::map<std::int64_t, Waiting> whole;  // Waiting for their other half; by utime.
-    std::int64_t last_sequence = -1;        // Of the newest whole one; -1: none.
+    std::int64_t last_sequence = -1;        // Of the newest whole one; without one, of the first part; -1: none.
+    std::int64_t newest_sequence = -1;      // Of any part.
     std::int64_t lost = 0;
     std::int64_t refused = 0;
     const SubscriptionCounts* counts = nullptr;
+
+    // With those after the newest whole one, of which something has come but never all.
+    std::int64_t AllLost() const;
   };
 
   void OnPart(const image_part_t& part, Half& half);

@@ -246,6 +246,22 @@ TEST(FrameLink, LossesAreCountedForEveryChannel) {
   EXPECT_EQ(receiver.frames(), 3);
 }
 
+TEST(FrameLink, FramesThatNeverArriveWholeAreCountedAsTheyPass) {
+  std::vector<rgbd::Frame> frames;
+  for (int i = 1; i <= 5; ++i) frames.push_back(NoiseFrame(640, 480, i * 1000));
+  Bus bus("memq://");
+  FrameReceiver receiver(bus);
+  for (const auto& [channel, part] : PartsOf(frames)) {
+    if (channel == kSensorColor && part.part > 0) continue;
+    bus.Publish(channel, part);
+  }
+  bus.Drain();
+  EXPECT_EQ(receiver.frames(), 0);
+  EXPECT_EQ(receiver.gaps(), 3);  // The first may have begun before we listened, the last may still come.
+  EXPECT_EQ(receiver.lost_colors(), 3);
+  EXPECT_EQ(receiver.lost_depths(), 0);
+}
+
 TEST(FrameLink, WhatClaimsToBeOfTheFutureDoesNotStopTheOthers) {
   Bus bus("memq://");
   FrameReceiver receiver(bus);
