@@ -151,6 +151,32 @@ Pairs PairsToRelate(const model::ObjectModel& object, int first_free_view, const
   return pairs;
 }
 
+// How far from where the surface alone wants it a fit of surface and texture is: squared, in standard deviations of the former.
+double Contradiction(const pose::DenseFit& both, const pose::DenseFit& surface) {
+  const geometry::Rigid moved = both.T_camera_object * surface.T_camera_object.inverse();
+  const Eigen::AngleAxisd turn(moved.linear());
+  Eigen::Matrix<double, 6, 1> step;
+  step << moved.translation(), turn.angle() * turn.axis();
+  return step.dot(surface.information * step);
+}
+
+// What one view looks like fitted to the images of another; nullopt where nothing says that they show the same. The surface alone
+// is asked where looks led astray: what does not look alike where they drew it (a blur, a shine), and, where few shared points say
+// that there is print to go by, what the surface contradicts (an outline inside the object, as of a cap before its bottle, has a
+// gradient but stays with the camera).
+std::optional<pose::DenseFit> FitOfPair(const pose::Appearance& appearance, const rgbd::Frame& frame, const geometry::Rigid& T_b_a,
+                                        bool is_linked, int shared, const RefinementParams& params) {
+  constexpr int kPrint = 15;                  // Shared points: as many as hold a pose that is learned from.
+  constexpr double kMaxContradiction = 12.6;  // Six degrees of freedom stay below it by chance 95 times in 100.
+  const pose::SmoothImage image(frame, cv::Rect({0, 0}, frame.color.size()));
+  const pose::DenseFit both = pose::FitDensely(appearance, frame, &image, T_b_a, params.dense);
+  const bool alike = both.likeness.value_or(is_linked ? 1.0 : 0.0) >= params.min_likeness;
+  if (!alike && !is_linked) return std::nullopt;
+  if (!params.use_depth || (alike && shared >= kPrint)) return both;
+  const pose::DenseFit surface = pose::FitDensely({appearance.surface, {}}, frame, nullptr, T_b_a, params.dense);
+  return alike && Contradiction(both, surface) <= kMaxContradiction ? both : surface;
+}
+
 // Depth and colour images of pairs of views fitted to each other, from where the problem has them.
 std::vector<pose::BundleRelation> RelationsOf(const model::ObjectModel& object, const pose::BundleProblem& problem,
                                               const Pairs& pairs, const RefinementParams& params) {
@@ -164,13 +190,11 @@ std::vector<pose::BundleRelation> RelationsOf(const model::ObjectModel& object, 
     }
     rgbd::Frame frame = object.views[b].keyframe;
     if (!params.use_depth) frame.depth = cv::Mat();
-    const pose::SmoothImage image(frame, cv::Rect({0, 0}, frame.color.size()));
     const geometry::Rigid T_b_a = problem.views[b].T_camera_object * problem.views[a].T_camera_object.inverse();
-    pose::DenseFit fit = pose::FitDensely(appearance, frame, &image, T_b_a, params.dense);
-    const bool alike = fit.likeness.value_or(is_linked ? 1.0 : 0.0) >= params.min_likeness;
-    if (!alike && !is_linked) continue;
-    // What does not look alike where its looks drew it (a blur, a shine) was led astray by them: the surface alone is asked.
-    if (!alike && params.use_depth) fit = pose::FitDensely({appearance.surface, {}}, frame, nullptr, T_b_a, params.dense);
+    const int shared = SharedPoints(object.views[a], object.views[b]);
+    const auto found = FitOfPair(appearance, frame, T_b_a, is_linked, shared, params);
+    if (!found) continue;
+    const pose::DenseFit& fit = *found;
     if (4 * fit.samples <= params.surface_samples && 4 * fit.texture_samples <= params.texture_samples) continue;
     if (MeanMove(appearance, T_b_a, fit.T_camera_object) > params.max_relation_move_m) continue;
     relations.push_back({a, b, fit.T_camera_object, fit.information});

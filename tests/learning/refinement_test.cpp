@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <ctime>
+#include <functional>
 #include <iostream>
 #include <limits>
 #include <set>
@@ -194,6 +196,76 @@ TEST(Refinement, ADriftOnRealDataIsTakenBackToTheRecordingsPoses) {
   EXPECT_LT(apart.translation_m, 0.0005);
   EXPECT_LT(apart.rotation_rad, 0.1 * M_PI / 180);
   EXPECT_LT(report.bundle.final_rms_px, 1.2);
+}
+
+// Views of a box that share no points: only their images relate them. `brightness` of view, pixel from the principal point, and the
+// point there in object coordinates.
+using Brightness = std::function<double(int, const Eigen::Vector2d&, const Eigen::Vector3d&)>;
+model::ObjectModel WithLooksAlone(const BoxOrbit& orbit, const Brightness& brightness) {
+  model::ObjectModel object = orbit.object();
+  std::vector<model::ModelPoint> points;
+  for (int v = 0; v < static_cast<int>(object.views.size()); ++v) {
+    model::View& view = object.views[v];
+    for (int& point : view.points) {
+      points.push_back(object.points[point]);
+      point = static_cast<int>(points.size()) - 1;
+    }
+    const geometry::PinholeCamera& camera = view.keyframe.camera;
+    cv::Mat color = view.keyframe.color.clone();  // The images are shared.
+    for (int y = 0; y < color.rows; ++y) {
+      for (int x = 0; x < color.cols; ++x) {
+        const auto point = rgbd::PointAt(view.keyframe, {x, y}, 2);
+        if (!point) continue;
+        const Eigen::Vector3d in_object = orbit.truth()[v].inverse() * *point;
+        const double grey = brightness(v, {x - camera.cx, y - camera.cy}, in_object);
+        color.at<cv::Vec3b>(y, x) = cv::Vec3b::all(cv::saturate_cast<uchar>(grey));
+      }
+    }
+    view.keyframe.color = color;
+  }
+  object.points = std::move(points);
+  return object;
+}
+
+BoxOrbit FewViews() {
+  BoxOrbitOptions options;
+  options.views = 4;
+  options.turn_deg = 36.0;
+  options.drift_deg = 0.5;
+  options.wrong_links = 0.0;
+  return BoxOrbit(options);
+}
+
+double Print(const Eigen::Vector3d& p) { return 128.0 + 50.0 * std::sin(110.0 * (p.x() + p.y())) + 40.0 * std::sin(130.0 * p.z()); }
+
+double WorstTurnDeg(const BoxOrbit& orbit, const model::ObjectModel& object) {
+  double worst = 0.0;
+  for (int v = 0; v < static_cast<int>(object.views.size()); ++v) worst = std::max(worst, orbit.TurnOfViewDeg(object, v));
+  return worst;
+}
+
+TEST(Refinement, LooksRelateViewsThatShareNoPoints) {
+  const BoxOrbit orbit = FewViews();
+  const model::ObjectModel object = WithLooksAlone(orbit, [](int, const auto&, const Eigen::Vector3d& p) { return Print(p); });
+  ASSERT_GT(WorstTurnDeg(orbit, object), 1.2);
+  EXPECT_LT(WorstTurnDeg(orbit, Refined(object, 1, {})), 0.3);
+}
+
+TEST(Refinement, AViewThatDoesNotLookAlikeIsRelatedByItsSurface) {
+  const BoxOrbit orbit = FewViews();
+  const model::ObjectModel object = WithLooksAlone(orbit, [](int v, const Eigen::Vector2d& pixel, const Eigen::Vector3d& p) {
+    return v == 2 ? 128.0 + 60.0 * std::sin(0.13 * pixel.x() - 0.1 * pixel.y()) : Print(p);  // A reflection, say.
+  });
+  ASSERT_GT(orbit.TurnOfViewDeg(object, 2), 0.8);
+  EXPECT_LT(WorstTurnDeg(orbit, Refined(object, 1, {})), 0.4);
+}
+
+TEST(Refinement, LooksThatStayWithTheCameraDoNotTurnViewsAgainstTheirSurface) {
+  const BoxOrbit orbit = FewViews();
+  const model::ObjectModel object = WithLooksAlone(
+      orbit, [](int, const Eigen::Vector2d& pixel, const auto&) { return 128.0 + 100.0 * std::sin(0.1 * pixel.x()); });
+  ASSERT_GT(WorstTurnDeg(orbit, object), 1.2);
+  EXPECT_LT(WorstTurnDeg(orbit, Refined(object, 1, {})), 0.4);
 }
 
 TEST(LoopClosure, LinksAreBetweenTheSamePhysicalPoints) {
