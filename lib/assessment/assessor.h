@@ -16,6 +16,7 @@ struct TrialParams {
   int trials_per_view = 40;        // Virtual images per learned view, each offering only that view; >= 1.
   int negatives_per_view = 10;     // Images without the object, each another background as long as there are; >= 0.
   double max_rotation_deg = 60.0;  // Out of plane, uniform in 0..max; (0, 90].
+  double min_elevation_deg = 0.0;  // No camera is lower (object z up): below is the table; [-90, 90).
   double max_scale_octaves = 1.0;  // log2 scale within +-max, triangular about 0: 1 = 0.5..2 times the distance; >= 0.
   double max_image_noise = 16.0;   // Sigma, grey levels, one of 8 even levels from 0, the lowest of three draws; >= 0.
   double max_blur_px = 1.6;        // Sigma, likewise; >= 0.
@@ -23,6 +24,7 @@ struct TrialParams {
   double correct_m = 0.04;         // Mean point distance below which a detection is right; > 0.
   int image_width = 320;           // Virtual images are crops around the object, as tight as they can be but
   int image_height = 240;          // never larger than twice this, close objects included; >= 64.
+  measures::ObservedFit observed_fit = measures::ObservedFit::kGaussians;  // How p(o|c) is made of the confidences.
   std::uint32_t seed = 0;
 
   void Check() const;
@@ -42,26 +44,29 @@ struct Trial {
   double log2_scale = 0.0;
   double image_noise = 0.0;
   double blur_px = 0.0;
-  std::vector<Proposal> proposals;  // The most likely first.
+  std::vector<Proposal> alone;     // Of the view alone, the most likely first; none in a negative.
+  std::vector<Proposal> together;  // Likewise with all views up to this one on offer.
 
-  bool hypothesis() const { return !proposals.empty(); }
-  bool correct() const { return hypothesis() && proposals.front().correct; }
-  double confidence() const { return hypothesis() ? proposals.front().confidence : 0.0; }
+  // What the view alone led to.
+  bool hypothesis() const { return !alone.empty(); }
+  bool correct() const { return hypothesis() && alone.front().correct; }
+  double confidence() const { return hypothesis() ? alone.front().confidence : 0.0; }
 };
 
 // Trials for the views from `first_view` on. `backgrounds`: BGR images the object is pasted over (the run's own frames with the
-// objects masked, or photographs); plain grey noise where empty. Negatives are whole backgrounds, each once, and all views up to
-// this one are offered: it is whole models and whole images that make wrong detections. Deterministic in (model, params,
-// backgrounds); a view's dice do not depend on first_view, but views learned later change what earlier ones look like from aside.
-// `progress` is called after every trial. Cost: about 100 ms of one core a trial, two thirds of it interest points; and once those
-// of every background.
+// objects masked, or photographs); plain grey noise where empty. Only as strong interest points count as the first background would
+// have kept. Negatives are whole backgrounds, each once: it is whole models and whole images that make wrong detections.
+// Deterministic in (model, params, backgrounds); a view's dice do not depend on first_view, but views learned later change what
+// earlier ones look like from aside. `progress` is called after every trial. Cost: about 100 ms of one core a trial, two thirds of
+// it interest points; and once those of every background.
 std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, const std::vector<cv::Mat>& backgrounds,
                              const recognition::RecogniserParams& recogniser, const TrialParams& params,
                              const std::function<void(int done, int of)>& progress = {});
 
-// Both measures from trials. A view counts as detected where the proposal is right and p(o|c) >= 1/2.
+// Both measures from trials: p(o|c) from what was proposed with all views on offer, as the model is used; p(o|theta) from views
+// alone. A view counts as detected where its most likely proposal is right and has p(o|c) >= 1/2.
 measures::Measures FitMeasures(const std::vector<Trial>& trials, const recognition::RecogniserParams& recogniser,
-                               measures::Source source = measures::Source::kOwn);
+                               measures::ObservedFit observed_fit = measures::ObservedFit::kGaussians);
 
 // Uniform p(theta) over the part of the view sphere between two elevations (radians, object z up) at the given distances.
 std::vector<measures::WeightedViewpoint> UniformViewpoints(double min_elevation_rad, double max_elevation_rad,

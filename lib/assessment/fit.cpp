@@ -8,13 +8,14 @@
 namespace vantage::assessment {
 
 measures::Measures FitMeasures(const std::vector<Trial>& trials, const recognition::RecogniserParams& recogniser,
-                               measures::Source source) {
+                               measures::ObservedFit observed_fit) {
   measures::Measures measures;
   std::vector<measures::ConfidenceSample> proposals;
   for (const Trial& trial : trials) {
-    for (const Proposal& proposal : trial.proposals) proposals.push_back({proposal.confidence, proposal.correct});
+    for (const Proposal& proposal : trial.together) proposals.push_back({proposal.confidence, proposal.correct});
   }
-  measures.observed = measures::ObservedSuccess::Fit(proposals, source);
+  measures.observed =
+      measures::ObservedSuccess::Fit(proposals, measures::Source::kOwn, measures::ObservedSuccess::kPriorCount, observed_fit);
 
   std::vector<measures::PredictionSample> predictions;
   for (const Trial& trial : trials) {
@@ -22,7 +23,7 @@ measures::Measures FitMeasures(const std::vector<Trial>& trials, const recogniti
     const bool detected = trial.correct() && measures.observed.Probability(trial.confidence()) >= 0.5;
     predictions.push_back({trial.rotation_rad, trial.log2_scale, detected});
   }
-  measures.predicted = measures::PredictedSuccess::Fit(predictions, source);
+  measures.predicted = measures::PredictedSuccess::Fit(predictions, measures::Source::kOwn);
   if (!trials.empty()) measures.fingerprint = recogniser.Fingerprint();
   return measures;
 }

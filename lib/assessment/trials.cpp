@@ -9,12 +9,14 @@
 #include <string>
 
 #include "assessment/assessor.h"
+#include "assessment/strength_limit.h"
 #include "assessment/virtual_object.h"
 
 namespace vantage::assessment {
 namespace {
 
-constexpr int kLevels = 8;  // Of noise and of blur (section VI).
+constexpr int kLevels = 8;     // Of noise and of blur (section VI).
+constexpr int kMaxTilts = 50;  // Draws of a direction; then it is taken wherever it is.
 
 // Draws that are the same with every standard library.
 class Dice {
@@ -35,6 +37,11 @@ class Dice {
  private:
   std::mt19937 random_;
 };
+
+// Of the camera above the object's horizon, radians.
+double Elevation(const geometry::Rigid& T_camera_object) {
+  return std::asin(std::clamp(geometry::ViewDirection(T_camera_object).z(), -1.0, 1.0));
+}
 
 cv::Mat GreyNoise(const cv::Size& size, Dice* dice) {
   cv::RNG random(dice->Bits());
@@ -103,7 +110,10 @@ class TrialRunner {
     trial.view = view_;
     VirtualPose pose;
     pose.rotation_rad = trial.rotation_rad = dice.Uniform(0.0, params_.max_rotation_deg) * M_PI / 180.0;
-    pose.tilt_rad = dice.Uniform(0.0, 2.0 * M_PI);
+    for (int tries = 0; tries < kMaxTilts; ++tries) {
+      pose.tilt_rad = dice.Uniform(0.0, 2.0 * M_PI);
+      if (Elevation(VirtualCameraPose(View(), pose)) >= params_.min_elevation_deg * M_PI / 180.0) break;
+    }
     pose.roll_rad = dice.Uniform(-M_PI, M_PI);
     // The mean of two: objects are mostly met at about the distance they were learned at.
     const double scale = dice.Uniform(-params_.max_scale_octaves, params_.max_scale_octaves);
@@ -117,7 +127,9 @@ class TrialRunner {
     const cv::Mat window = Window(frame.camera, &dice);
     frame.color = Paste(RenderSharply(surface_, frame.camera, T_camera_object, pose.log2_scale < 0.0), window);
     Disturb(disturbance, dice.Bits(), &frame.color);
-    trial.proposals = Propose(*alone_, frame, alone_->Extract(frame), T_camera_object);
+    const features::Features features = Strongest(alone_->Extract(frame), MinResponse(disturbance));
+    trial.alone = Propose(*alone_, frame, features, T_camera_object);
+    trial.together = view_ == 0 ? trial.alone : Propose(*together_, frame, features, T_camera_object);
     return trial;
   }
 
@@ -141,12 +153,11 @@ class TrialRunner {
       frame.color = background.color;
       frame.camera.width = background.color.cols;
       frame.camera.height = background.color.rows;
-      if (!background.features) background.features = together_->Extract(frame);
-      features = *background.features;
+      features = FeaturesOf(&background);
     }
     frame.camera.cx = 0.5 * frame.camera.width;
     frame.camera.cy = 0.5 * frame.camera.height;
-    trial.proposals = Propose(*together_, frame, features, std::nullopt);
+    trial.together = Propose(*together_, frame, features, std::nullopt);
     return trial;
   }
 
@@ -174,6 +185,26 @@ class TrialRunner {
     return disturbance;
   }
 
+  const features::Features& FeaturesOf(Background* background) {
+    if (!background->features) {
+      rgbd::Frame frame;
+      frame.color = background->color;
+      background->features = together_->Extract(frame);
+    }
+    return *background->features;
+  }
+
+  // Of what a whole image, so disturbed, would keep.
+  double MinResponse(const Disturbance& disturbance) {
+    if (backgrounds_.empty()) return 0.0;
+    if (!limit_) {
+      Background& background = backgrounds_.front();
+      limit_.emplace(background.color, FeaturesOf(&background), recogniser_params_.features,
+                     cv::Size(params_.image_width, params_.image_height));
+    }
+    return limit_->Response(disturbance);
+  }
+
   cv::Mat Window(const geometry::PinholeCamera& camera, Dice* dice) const {
     const cv::Size size(camera.width, camera.height);
     if (backgrounds_.empty()) return GreyNoise(size, dice);
@@ -196,6 +227,7 @@ class TrialRunner {
   const VirtualObject surface_;
   const Eigen::Matrix3Xd points_;
   std::vector<Background> backgrounds_;
+  std::optional<StrengthLimit> limit_;
   const TrialParams& params_;
   recognition::RecogniserParams recogniser_params_;
   std::unique_ptr<recognition::Recogniser> alone_;     // The view.
@@ -212,6 +244,7 @@ void TrialParams::Check() const {
   require(trials_per_view >= 1, "trials_per_view must be >= 1");
   require(negatives_per_view >= 0, "negatives_per_view must be >= 0");
   require(max_rotation_deg > 0.0 && max_rotation_deg <= 90.0, "max_rotation_deg must be in (0, 90]");
+  require(min_elevation_deg >= -90.0 && min_elevation_deg < 90.0, "min_elevation_deg must be in [-90, 90)");
   require(max_scale_octaves >= 0.0, "max_scale_octaves must be >= 0");
   require(max_image_noise >= 0.0, "max_image_noise must be >= 0");
   require(max_blur_px >= 0.0, "max_blur_px must be >= 0");

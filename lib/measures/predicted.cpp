@@ -1,5 +1,6 @@
 #include "measures/predicted.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,6 +21,45 @@ constexpr std::array<double, kRows> kDefaultOverRotation = {0.99, 0.97, 0.93, 0.
 constexpr std::array<double, kColumns> kDefaultOverScale = {0.67, 0.87, 1.0, 0.87, 0.67};
 
 double DefaultProbability(int row, int column) { return kDefaultOverRotation[row] * kDefaultOverScale[column]; }
+
+// How the object at hand differs from the default: its log odds are the default's plus x . (1, theta, s, s^2), theta in radians.
+// Maximum a posteriori with independent Gaussians about 0, so that without trials it does not.
+using Difference = Eigen::Vector4d;
+const Difference kDifferenceSigma(0.8, 2.5, 1.0, 1.0);
+constexpr double kLeastDefault = 0.002;  // Log odds stay finite.
+
+Eigen::Vector4d DifferenceBasis(int row, int column) {
+  const double theta = (row + 0.5) * PredictedSuccess::kRotationStepRad;
+  const double s = (column - 0.5 * (kColumns - 1)) * PredictedSuccess::kScaleStep;
+  return {1.0, theta, s, s * s};
+}
+
+double WithDifference(int row, int column, const Difference& difference) {
+  const double p = std::clamp(DefaultProbability(row, column), kLeastDefault, 1.0 - kLeastDefault);
+  return 1.0 / (1.0 + std::exp(-std::log(p / (1.0 - p)) - difference.dot(DifferenceBasis(row, column))));
+}
+
+// Newton's method; the posterior has one maximum.
+Difference FitDifference(const std::vector<double>& trials, const std::vector<double>& successes) {
+  const Difference precision = kDifferenceSigma.array().square().inverse();
+  Difference x = Difference::Zero();
+  for (int iteration = 0; iteration < 30; ++iteration) {
+    Eigen::Vector4d gradient = -precision.cwiseProduct(x);
+    Eigen::Matrix4d curvature = precision.asDiagonal();
+    for (int cell = 0; cell < kCells; ++cell) {
+      if (trials[cell] <= 0.0) continue;
+      const int row = cell / kColumns, column = cell % kColumns;
+      const Eigen::Vector4d basis = DifferenceBasis(row, column);
+      const double p = WithDifference(row, column, x);
+      gradient += (successes[cell] - trials[cell] * p) * basis;
+      curvature += trials[cell] * p * (1.0 - p) * basis * basis.transpose();
+    }
+    const Difference step = curvature.ldlt().solve(gradient);
+    x += step * std::min(1.0, 2.0 / std::max(1e-12, step.norm()));  // Far from the maximum it overshoots.
+    if (step.norm() < 1e-9) break;
+  }
+  return x;
+}
 
 // A position on an axis of cell centres, between `cell` and the next one; held at the ends.
 struct Between {
@@ -80,6 +120,8 @@ void MakeNonIncreasing(std::array<double, kRows>* values, const std::array<doubl
 
 std::vector<double> ProbabilityTable(const std::vector<double>& trials, const std::vector<double>& successes, double prior_count) {
   const std::vector<double> shared_trials = Shared(trials), shared_successes = Shared(successes);
+  const bool tried = std::any_of(trials.begin(), trials.end(), [](double count) { return count > 0.0; });
+  const Difference difference = tried ? FitDifference(trials, successes) : Difference::Zero();
   std::vector<double> table(kCells);
   for (int column = 0; column < kColumns; ++column) {
     std::array<double, kRows> values, weights;
@@ -87,7 +129,8 @@ std::vector<double> ProbabilityTable(const std::vector<double>& trials, const st
       const int cell = row * kColumns + column;
       // Equation (12): p(theta|o) p(o) / p(theta) is the ratio of successes to trials.
       weights[row] = shared_trials[cell] + prior_count;
-      values[row] = (shared_successes[cell] + prior_count * DefaultProbability(row, column)) / weights[row];
+      const double expected = tried ? WithDifference(row, column, difference) : DefaultProbability(row, column);
+      values[row] = (shared_successes[cell] + prior_count * expected) / weights[row];
     }
     MakeNonIncreasing(&values, weights);
     for (int row = 0; row < kRows; ++row) table[row * kColumns + column] = values[row];

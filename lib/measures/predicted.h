@@ -15,9 +15,10 @@ struct PredictionSample {
   bool detected = false;
 };
 
-// The grid of counts. By Bayes with p(o) = share of successes, (12) is the ratio of counts; here smoothed: every cell starts with
-// `prior_count` pseudo-trials that succeed as often as the shipped default says, and neighbouring cells share trials by a
-// triangular kernel, so that few trials are never sure.
+// The grid of counts. By Bayes with p(o) = share of successes, (12) is the ratio of counts; here smoothed: neighbouring cells share
+// trials by a triangular kernel, and every cell starts with `prior_count` pseudo-trials, so that few trials are never sure. Those
+// succeed as often as the shipped default says once it is shifted to all trials of the object: its log odds plus a linear function
+// of rotation, scale and squared scale, held towards none.
 class PredictedSuccess {
  public:
   static constexpr int kRotationCells = 18;  // 5 degrees each, from 0 to 90.

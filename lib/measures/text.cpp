@@ -11,8 +11,24 @@ using Json = nlohmann::json;
 
 Json ToJson(const Gaussian& gaussian) { return {{"mean", gaussian.mean}, {"sigma", gaussian.sigma}, {"count", gaussian.count}}; }
 
+Json ToJson(const std::vector<Knot>& curve) {
+  Json json = Json::array();
+  for (const Knot& knot : curve) json.push_back({knot.confidence, knot.log_ratio});
+  return json;
+}
+
 Gaussian GaussianFromJson(const Json& json) {
   return {json.at("mean").get<double>(), json.at("sigma").get<double>(), json.at("count").get<int>()};
+}
+
+ObservedSuccess ObservedFromJson(const Json& json) {
+  const Gaussian positive = GaussianFromJson(json.at("positive")), negative = GaussianFromJson(json.at("negative"));
+  const Source source = SourceFromString(json.at("source").get<std::string>());
+  const ObservedFit fit = ObservedFitFromString(json.value("fit", "gaussians"));  // Older stores know no other.
+  if (fit == ObservedFit::kGaussians) return {positive, negative, source};
+  std::vector<Knot> curve;
+  for (const Json& knot : json.at("curve")) curve.push_back({knot.at(0).get<double>(), knot.at(1).get<double>()});
+  return {positive, negative, source, fit, std::move(curve)};
 }
 
 }  // namespace
@@ -23,7 +39,9 @@ std::string ToText(const Measures& measures) {
   Json json;
   json["observed"] = {{"positive", ToJson(observed.positive())},
                       {"negative", ToJson(observed.negative())},
-                      {"source", ToString(observed.source())}};
+                      {"source", ToString(observed.source())},
+                      {"fit", ToString(observed.fit())},
+                      {"curve", ToJson(observed.curve())}};
   json["predicted"] = {{"trials", predicted.trial_counts()},
                        {"successes", predicted.success_counts()},
                        {"prior_count", predicted.prior_count()},
@@ -35,11 +53,9 @@ std::string ToText(const Measures& measures) {
 Measures MeasuresFromText(const std::string& text) {
   try {
     const Json json = Json::parse(text);
-    const Json& observed = json.at("observed");
     const Json& predicted = json.at("predicted");
     Measures measures;
-    measures.observed = ObservedSuccess(GaussianFromJson(observed.at("positive")), GaussianFromJson(observed.at("negative")),
-                                        SourceFromString(observed.at("source").get<std::string>()));
+    measures.observed = ObservedFromJson(json.at("observed"));
     measures.predicted = PredictedSuccess::FromCounts(
         predicted.at("trials").get<std::vector<double>>(), predicted.at("successes").get<std::vector<double>>(),
         SourceFromString(predicted.at("source").get<std::string>()), predicted.at("prior_count").get<double>());

@@ -23,6 +23,20 @@ Result<measures::Gaussian> FromMessage(const gaussian_t& message) {
   return measures::Gaussian{message.mean, message.sigma, message.count};
 }
 
+// Throws std::invalid_argument.
+measures::ObservedSuccess Observed(const measures_t& message, const measures::Gaussian& positive,
+                                   const measures::Gaussian& negative) {
+  const measures::Source source = measures::SourceFromString(message.observed_source);
+  const measures::ObservedFit fit = measures::ObservedFitFromString(message.observed_fit);
+  if (fit == measures::ObservedFit::kGaussians) return {positive, negative, source};
+  if (message.knot_confidence.size() != message.knot_log_ratio.size()) throw std::invalid_argument("knots that are not pairs");
+  std::vector<measures::Knot> curve;
+  for (std::size_t i = 0; i < message.knot_confidence.size(); ++i) {
+    curve.push_back({message.knot_confidence[i], message.knot_log_ratio[i]});
+  }
+  return {positive, negative, source, fit, std::move(curve)};
+}
+
 bool IsCount(double value) { return std::isfinite(value) && value >= 0.0; }
 
 }  // namespace
@@ -54,6 +68,12 @@ measures_t ToMessage(const ObjectMeasures& measures) {
   message.observed_source = measures::ToString(measures.measures.observed.source());
   message.positive = ToMessage(measures.measures.observed.positive());
   message.negative = ToMessage(measures.measures.observed.negative());
+  message.observed_fit = measures::ToString(measures.measures.observed.fit());
+  for (const measures::Knot& knot : measures.measures.observed.curve()) {
+    message.knot_confidence.push_back(knot.confidence);
+    message.knot_log_ratio.push_back(knot.log_ratio);
+  }
+  message.knots = static_cast<std::int16_t>(message.knot_confidence.size());
   message.predicted_source = measures::ToString(measures.measures.predicted.source());
   message.trials = measures.measures.predicted.trial_counts();
   message.successes = measures.measures.predicted.success_counts();
@@ -84,7 +104,7 @@ Result<ObjectMeasures> FromMessage(const measures_t& message) {
   result.completeness = message.completeness;
   result.measures.fingerprint = message.fingerprint;
   try {
-    result.measures.observed = measures::ObservedSuccess(*positive, *negative, measures::SourceFromString(message.observed_source));
+    result.measures.observed = Observed(message, *positive, *negative);
     result.measures.predicted = measures::PredictedSuccess::FromCounts(
         message.trials, message.successes, measures::SourceFromString(message.predicted_source), message.prior_count);
   } catch (const std::invalid_argument& error) {

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 #include <utility>
 
+#include "measures/pooled.h"
 #include "pose/multi_ransac.h"
 #include "recognition/guided.h"
 #include "recognition/voting.h"
@@ -50,11 +52,29 @@ std::string RecogniserParams::Fingerprint() const {
          std::to_string(min_inliers) + ":" + std::to_string(ransac.inlier_px);
 }
 
+std::string MeasuresMismatch(const model::ObjectModel& object, const RecogniserParams& params) {
+  const std::string& fingerprint = object.measures.fingerprint;
+  if (fingerprint.empty() || fingerprint == params.Fingerprint()) return "";
+  return "the measures of '" + object.name + "' were learned with other settings (" + fingerprint + ", here " +
+         params.Fingerprint() + ") and are not used; learn them again with vantage assess";
+}
+
 struct Recogniser::Impl {
   explicit Impl(const RecogniserParams& all) : params(all), matcher(all.matching, all.features.type) {}
 
   RecogniserParams params;
   Matcher matcher;
+  std::map<std::string, measures::ObservedSuccess> own_measures;  // By object, where they hold for these parameters.
+  measures::ObservedSuccess pooled;                               // Of the others.
+
+  // Null where the object has none.
+  void SetOwn(const std::string& name, const measures::ObservedSuccess* measure) {
+    if (measure == nullptr && own_measures.erase(name) == 0) return;
+    if (measure != nullptr) own_measures[name] = *measure;
+    std::vector<measures::ObservedSuccess> all;
+    for (const auto& [object, own] : own_measures) all.push_back(own);
+    pooled = measures::PooledObserved(all);
+  }
 
   std::vector<VoteCluster> Vote(const Known& known, const features::Features& features,
                                 const std::vector<Tentative>& matches) const {
@@ -145,8 +165,10 @@ struct Recogniser::Impl {
     detection.object = object.name;
     detection.T_camera_object = hypothesis.T_camera_object;
     detection.confidence = model::ObjectConfidence(object, detection.T_camera_object, frame, grid, params.confidence);
-    detection.probability = object.measures.observed.Probability(detection.confidence.value, prior);
-    detection.source = object.measures.observed.source();
+    const auto own = own_measures.find(object.name);
+    const measures::ObservedSuccess& observed = own == own_measures.end() ? pooled : own->second;
+    detection.probability = observed.Probability(detection.confidence.value, prior);
+    detection.source = observed.source();
     detection.inliers = static_cast<int>(hypothesis.keypoints.size());
     detection.inlier_pixels = std::move(hypothesis.pixels);
     return detection;
@@ -168,9 +190,16 @@ void Recogniser::Set(std::shared_ptr<const model::ObjectModel> object) {
                                 "; learn it again or change the features");
   }
   impl_->matcher.Set(object);
+  const bool own = object->measures.observed.source() == measures::Source::kOwn && MeasuresMismatch(*object, params_).empty();
+  impl_->SetOwn(object->name, own ? &object->measures.observed : nullptr);
 }
 
-void Recogniser::Remove(const std::string& name) { impl_->matcher.Remove(name); }
+void Recogniser::Remove(const std::string& name) {
+  impl_->matcher.Remove(name);
+  impl_->SetOwn(name, nullptr);
+}
+
+const measures::ObservedSuccess& Recogniser::Pooled() const { return impl_->pooled; }
 
 int Recogniser::size() const { return impl_->matcher.size(); }
 

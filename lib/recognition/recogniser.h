@@ -33,6 +33,9 @@ struct RecogniserParams {
   std::string Fingerprint() const;  // What a fitted measure holds for.
 };
 
+// Why the object's own measures do not hold for these parameters; empty where they do or where it has none.
+std::string MeasuresMismatch(const model::ObjectModel& object, const RecogniserParams& params);
+
 struct Detection {
   std::string object;
   geometry::Rigid T_camera_object = geometry::Rigid::Identity();
@@ -61,11 +64,15 @@ class Recogniser {
 
   const RecogniserParams& params() const { return params_; }
 
-  // Adds the object or replaces what was known of it. Cost: linear in its descriptors.
+  // Adds the object or replaces what was known of it. Where its own measures are missing or of other settings, p(o|c) is that of
+  // the other objects pooled, or else the shipped default. Cost: linear in its descriptors.
   // Throws std::invalid_argument where its features are of another kind than ours.
   void Set(std::shared_ptr<const model::ObjectModel> object);
   void Remove(const std::string& name);
   int size() const;
+
+  // p(o|c) of an object without measures of its own.
+  const measures::ObservedSuccess& Pooled() const;
 
   features::Features Extract(const rgbd::Frame& frame) const;
 

@@ -96,7 +96,7 @@ class Run {
     trials.seed += params_.seed;
     const auto fresh = assessment::RunTrials(*object, newest, backgrounds_, params_.learner.recogniser, trials);
     trials_.insert(trials_.end(), fresh.begin(), fresh.end());
-    learner_.SetMeasures(assessment::FitMeasures(trials_, params_.learner.recogniser));
+    learner_.SetMeasures(assessment::FitMeasures(trials_, params_.learner.recogniser, params_.trials.observed_fit));
     ListCandidates();
     result_.completeness = CompletenessNow();
     if (store_) store_->SaveMeasures(object->name, learner_.object()->measures, result_.completeness);

@@ -134,7 +134,7 @@ Assessment Worker::Assess(const std::string& object, const std::optional<rgbd::F
   result.assessed_views = static_cast<int>(known.trials.size());
   std::vector<assessment::Trial> all;
   for (const auto& [id, trials] : known.trials) all.insert(all.end(), trials.begin(), trials.end());
-  result.measures = assessment::FitMeasures(all, params_.recogniser);
+  result.measures = assessment::FitMeasures(all, params_.recogniser, params_.trials.observed_fit);
   result.trials = static_cast<int>(all.size());
   return result;
 }

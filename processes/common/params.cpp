@@ -217,6 +217,7 @@ void Fields(Visitor& visit, assessment::TrialParams& params) {
   visit("trials_per_view", params.trials_per_view);
   visit("negatives_per_view", params.negatives_per_view);
   visit("max_rotation_deg", params.max_rotation_deg);
+  visit("min_elevation_deg", params.min_elevation_deg);
   visit("max_scale_octaves", params.max_scale_octaves);
   visit("max_image_noise", params.max_image_noise);
   visit("max_blur_px", params.max_blur_px);
@@ -224,6 +225,7 @@ void Fields(Visitor& visit, assessment::TrialParams& params) {
   visit("correct_m", params.correct_m);
   visit("image_width", params.image_width);
   visit("image_height", params.image_height);
+  visit("observed_fit", params.observed_fit);
   visit("seed", params.seed);
 }
 
@@ -287,14 +289,9 @@ class YamlReader {
   }
 
   void operator()(const std::string& key, measures::CompletenessRule& rule) {
-    std::string text = measures::ToString(rule);
-    mapping_.Get(key, text);
-    try {
-      rule = measures::CompletenessRuleFromString(text);
-    } catch (const std::invalid_argument& error) {
-      mapping_.Fail(key, error.what());
-    }
+    Named(key, measures::CompletenessRuleFromString, rule);
   }
+  void operator()(const std::string& key, measures::ObservedFit& fit) { Named(key, measures::ObservedFitFromString, fit); }
 
   template <typename Params>
   void Nested(const std::string& key, Params& params) {
@@ -306,6 +303,18 @@ class YamlReader {
   }
 
  private:
+  // A value that is written as one of a few names; `from_text` throws std::invalid_argument for others.
+  template <typename Value>
+  void Named(const std::string& key, Value (*from_text)(const std::string&), Value& value) {
+    std::string text = measures::ToString(value);
+    mapping_.Get(key, text);
+    try {
+      value = from_text(text);
+    } catch (const std::invalid_argument& error) {
+      mapping_.Fail(key, error.what());
+    }
+  }
+
   config::Mapping& mapping_;
 };
 
@@ -333,6 +342,7 @@ class Flattener {
     text << value;
   }
   static void Print(std::ostream& text, const measures::CompletenessRule& rule) { text << measures::ToString(rule); }
+  static void Print(std::ostream& text, const measures::ObservedFit& fit) { text << measures::ToString(fit); }
   static void Print(std::ostream& text, const Eigen::Vector3d& vector) { text << vector.transpose(); }
   static void Print(std::ostream& text, const std::vector<double>& numbers) {
     for (const double number : numbers) text << number << ' ';

@@ -55,7 +55,11 @@ void RecogniserNode::Reload() {
     revisions_[summary.name] = summary.revision;
     try {
       auto object = store_->Load(summary.name);
-      if (object) recogniser_.Set(std::make_shared<const model::ObjectModel>(std::move(*object)));
+      if (object) {
+        const std::string mismatch = recognition::MeasuresMismatch(*object, recogniser_.params());
+        if (!mismatch.empty()) NoteError(params_.store + ": " + mismatch);
+        recogniser_.Set(std::make_shared<const model::ObjectModel>(std::move(*object)));
+      }
       Count("reloads");
     } catch (const std::exception& error) {
       NoteError(params_.store + ": object '" + summary.name + "' is left out: " + error.what());

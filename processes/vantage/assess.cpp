@@ -113,7 +113,7 @@ void RunAssess(const AssessOptions& options) {
     if (object->views.empty()) throw std::runtime_error(options.store + ": object '" + name + "' has no views; learn it again");
     const std::vector<assessment::Trial> trials = assessment::RunTrials(
         *object, 0, options.backgrounds.empty() ? OwnBackgrounds(*object) : backgrounds, params.recogniser, params.trials);
-    const measures::Measures fitted = assessment::FitMeasures(trials, params.recogniser);
+    const measures::Measures fitted = assessment::FitMeasures(trials, params.recogniser, params.trials.observed_fit);
     const std::vector<measures::WeightedViewpoint> directions = assessment::UniformViewpoints(
         params.candidates.min_elevation_rad, params.candidates.max_elevation_rad, {MedianDistance(*object)});
     const double completeness = measures::Completeness(object->viewpoints(), directions, fitted.predicted, params.planner.rule);

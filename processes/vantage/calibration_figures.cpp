@@ -162,12 +162,15 @@ std::string ViewTable(const CalibrationTrial& trial) {
 
 std::string TrialTable(const CalibrationTrial& trial) {
   std::ostringstream text;
-  text << "views,draw,view,shown,rotation_deg,log2_scale,noise,blur_px,proposals,confidence,right\n";
+  text << "views,draw,view,shown,rotation_deg,log2_scale,noise,blur_px,proposals,confidence,right,together,together_confidence,"
+          "together_right\n";
   for (const JudgedModel& model : trial.models) {
     for (const assessment::Trial& one : model.trials) {
       text << model.views << ',' << model.draw << ',' << one.view << ',' << one.object_shown << ',' << one.rotation_rad / kDegree
-           << ',' << one.log2_scale << ',' << one.image_noise << ',' << one.blur_px << ',' << one.proposals.size() << ','
-           << one.confidence() << ',' << one.correct() << '\n';
+           << ',' << one.log2_scale << ',' << one.image_noise << ',' << one.blur_px << ',' << one.alone.size() << ','
+           << one.confidence() << ',' << one.correct() << ',' << one.together.size() << ','
+           << (one.together.empty() ? 0.0 : one.together.front().confidence) << ','
+           << (!one.together.empty() && one.together.front().correct) << '\n';
     }
   }
   return text.str();
@@ -242,9 +245,12 @@ Json FiguresOf(const CalibrationTrial& trial, std::uint32_t seed) {
     all.push_back(&model);
     by_views[model.views].push_back(&model);
   }
+  Json figures;
+  figures["frames_that_teach"] = trial.taught;
+  figures["frames_to_learn_from"] = trial.offered;
+  if (all.empty()) return figures;
   const auto count = [&](auto&& test) { return std::count_if(trial.frames.begin(), trial.frames.end(), test); };
   const double prior = PriorOf(all);
-  Json figures;
   figures["frames"] = count([](const auto& frame) { return frame.T_camera_mesh.has_value(); });
   figures["frames_with_object"] = count([](const auto& frame) { return frame.counts; });
   figures["absent_frames"] = count([](const auto& frame) { return !frame.T_camera_mesh; });
@@ -260,6 +266,10 @@ Json FiguresOf(const CalibrationTrial& trial, std::uint32_t seed) {
 }
 
 std::string TableOf(const Json& figures) {
+  if (!figures.contains("pooled")) {
+    return "cannot be learned: " + figures["frames_that_teach"].dump() + " of " + figures["frames_to_learn_from"].dump() +
+           " frames show enough of it\n";
+  }
   const Json& pooled = figures["pooled"];
   char line[300];
   std::string text;
@@ -303,6 +313,7 @@ void SaveCalibration(const CalibrationTrial& trial, const Json& figures, const s
   WriteWhole(folder / "trials.csv", TrialTable(trial));
   WriteWhole(folder / "models.csv", ModelTable(trial));
   WriteWhole(folder / "figures.json", figures.dump(2) + "\n");
+  if (trial.models.empty()) return;
   const Json& pooled = figures["pooled"];
   WriteWhole(folder / "reliability.gnuplot", ReliabilityData("observed", pooled["observed"]) +
                                                  ReliabilityData("half", pooled["observed_prior_half"]) +

@@ -1,6 +1,7 @@
 #include "vantage/calibration_trial.h"
 
 #include <algorithm>
+#include <memory>
 #include <mutex>
 #include <numeric>
 #include <opencv2/core/utility.hpp>
@@ -19,6 +20,7 @@ namespace {
 constexpr double kMinShareInImage = 0.5;
 constexpr int kMaxBackgrounds = 8;  // As the assessor keeps.
 constexpr int kMinTrialsPerView = 8;
+constexpr int kSimulatedFrames = 96;
 
 // `count` of 0..of-1, ascending.
 std::vector<int> Draw(int count, int of, std::mt19937* random) {
@@ -36,14 +38,22 @@ std::vector<int> Draw(int count, int of, std::mt19937* random) {
 // What every model of one run shares.
 class Field {
  public:
-  Field(const CalibrationOptions& options, const params::LibraryParams& params)
-      : options_(options), params_(params), scene_(options.folder), known_(scene_, options.object_id) {
-    const std::vector<int> even = FramesOf(scene_, "even");
-    for (std::size_t i = 0; i < even.size(); ++i) {
-      (options.tune && i % 2 == 1 ? judged_ids_ : learned_ids_).push_back(even[i]);
+  Field(const CalibrationOptions& options, const params::LibraryParams& params) : options_(options), params_(params) {
+    if (options.world) {
+      simulated_ = std::make_unique<SimulatedObject>(*options.world, kSimulatedFrames, options.seed);
+      known_ = simulated_.get();
+    } else {
+      scene_ = std::make_unique<rgbd::BopScene>(options.folder);
+      recorded_ = std::make_unique<RecordedObject>(*scene_, options.object_id);
+      known_ = recorded_.get();
     }
-    if (!options.tune) judged_ids_ = FramesOf(scene_, "odd");
-    truth_.points_in_mesh = known_.Surface(learned_ids_);
+    int evens = 0;
+    for (const int id : known_->ids()) {
+      const bool even = id % 2 == 0;
+      if (!options.tune) (even ? learned_ids_ : judged_ids_).push_back(id);
+      if (options.tune && even) (evens++ % 2 == 1 ? judged_ids_ : learned_ids_).push_back(id);
+    }
+    truth_.points_in_mesh = known_->Surface(learned_ids_);
     truth_.correct_m = params.trials.correct_m;
     // As the learner has it: the object's frame is in its middle.
     truth_.T_mesh_object.translation() = truth_.points_in_mesh.rowwise().mean();
@@ -51,18 +61,22 @@ class Field {
 
   const assessment::Truth& truth() const { return truth_; }
   assessment::Truth* mutable_truth() { return &truth_; }
-  const rgbd::BopScene& scene() const { return scene_; }
+  const rgbd::BopScene& scene() const { return *scene_; }
+  int offered() const { return static_cast<int>(learned_ids_.size()); }
 
-  model::ObjectModel Learn() const { return known_.Learn(learned_ids_, params_.recogniser.features, truth_.T_mesh_object); }
+  model::ObjectModel Learn() const { return known_->Learn(learned_ids_, params_.recogniser.features, truth_.T_mesh_object); }
 
   // Frames that judge, then those without the object.
   std::vector<assessment::HeldOutFrame> HeldOut() const {
     std::vector<assessment::HeldOutFrame> frames;
-    for (const int id : judged_ids_) frames.push_back(Load(scene_, id, known_.TruePose(id)));
+    for (const int id : judged_ids_) frames.push_back(HeldOutFrame(known_->Load(id), known_->TruePose(id)));
+    for (std::size_t i = 0; simulated_ && i < judged_ids_.size(); i += static_cast<std::size_t>(options_.absent_step)) {
+      frames.push_back(HeldOutFrame(simulated_->Without(judged_ids_[i]), std::nullopt));
+    }
     for (const std::string& folder : options_.absent) {
       const rgbd::BopScene absent(folder);
       for (std::size_t i = 0; i < absent.ids().size(); i += static_cast<std::size_t>(options_.absent_step)) {
-        frames.push_back(Load(absent, absent.ids()[i], std::nullopt));
+        frames.push_back(HeldOutFrame(absent.Load(absent.ids()[i]), std::nullopt));
       }
     }
     const recognition::Recogniser recogniser(params_.recogniser);
@@ -91,15 +105,15 @@ class Field {
     std::vector<cv::Mat> images;
     for (const int i : Draw(count, static_cast<int>(learned_ids_.size()), random)) {
       const int id = learned_ids_[static_cast<std::size_t>(i)];
-      images.push_back(assessment::MaskedBackground(scene_.Load(id).color, known_.Mask(id)));
+      images.push_back(assessment::MaskedBackground(known_->Load(id).color, known_->Mask(id)));
     }
     return images;
   }
 
  private:
-  assessment::HeldOutFrame Load(const rgbd::BopScene& scene, int id, const std::optional<geometry::Rigid>& T_camera_mesh) const {
+  assessment::HeldOutFrame HeldOutFrame(rgbd::Frame frame, const std::optional<geometry::Rigid>& T_camera_mesh) const {
     assessment::HeldOutFrame held_out;
-    held_out.frame = scene.Load(id);
+    held_out.frame = std::move(frame);
     held_out.frame.depth = cv::Mat();
     held_out.frame.T_world_camera.reset();
     held_out.T_camera_mesh = T_camera_mesh;
@@ -110,8 +124,10 @@ class Field {
 
   const CalibrationOptions& options_;
   const params::LibraryParams& params_;
-  rgbd::BopScene scene_;
-  KnownObject known_;
+  std::unique_ptr<rgbd::BopScene> scene_;  // Of a recording.
+  std::unique_ptr<RecordedObject> recorded_;
+  std::unique_ptr<SimulatedObject> simulated_;  // Else.
+  const KnownFrames* known_ = nullptr;          // One of these.
   std::vector<int> learned_ids_, judged_ids_;
   assessment::Truth truth_;
 };
@@ -142,14 +158,10 @@ class DrawnModels {
   DrawnModels(const CalibrationOptions& options, const params::LibraryParams& params, const Field& field,
               const std::vector<assessment::HeldOutFrame>& frames)
       : options_(options), params_(params), field_(field), frames_(frames), all_(field.Learn()) {
-    const int largest = *std::max_element(options.views.begin(), options.views.end());
-    if (static_cast<int>(all_.views.size()) < largest) {
-      throw std::runtime_error(options.folder + ": --views " + std::to_string(largest) + " asks for more views than the " +
-                               std::to_string(all_.views.size()) + " frames to learn from show");
-    }
     alone_ = assessment::TryViewsAlone(all_, field.truth(), frames, params.recogniser);
     std::mt19937 random(options.seed);
     for (const int views : options.views) {
+      if (views > static_cast<int>(all_.views.size())) continue;
       for (int draw = 0; draw < options.draws; ++draw) {
         chosen_.push_back(Draw(views, static_cast<int>(all_.views.size()), &random));
         judged_.emplace_back();
@@ -158,6 +170,8 @@ class DrawnModels {
       }
     }
   }
+
+  int learned_views() const { return static_cast<int>(all_.views.size()); }
 
   std::vector<JudgedModel> Run(const std::function<void(int done, int of)>& progress) {
     std::mutex mutex;
@@ -184,7 +198,7 @@ class DrawnModels {
     trials.seed = options_.seed + static_cast<std::uint32_t>(i);
     std::mt19937 random(trials.seed);
     judged.trials = assessment::RunTrials(object, 0, field_.Backgrounds(&random), params_.recogniser, trials);
-    object.measures = assessment::FitMeasures(judged.trials, params_.recogniser);
+    object.measures = assessment::FitMeasures(judged.trials, params_.recogniser, trials.observed_fit);
     for (const assessment::ViewTrial& trial : alone_) {
       if (std::binary_search(chosen_[i].begin(), chosen_[i].end(), trial.view)) judged.view_trials.push_back(trial);
     }
@@ -225,10 +239,14 @@ CalibrationTrial TryCalibration(const CalibrationOptions& options, const params:
   Field field(options, params);
   CalibrationTrial trial;
   trial.frames = field.HeldOut();
+  trial.offered = field.offered();
   if (!options.store.empty()) {
     trial.models.push_back(JudgeStored(options, params, field, trial.frames));
+    trial.taught = trial.models.front().views;
   } else {
-    trial.models = DrawnModels(options, params, field, trial.frames).Run(progress);
+    DrawnModels models(options, params, field, trial.frames);
+    trial.taught = models.learned_views();
+    trial.models = models.Run(progress);
   }
   return trial;
 }

@@ -3,12 +3,14 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "assessment/assessor.h"
 #include "assessment/held_out.h"
 #include "common/params.h"
+#include "simulation/simulated_world.h"
 #include "vantage/verb.h"
 
 namespace vantage::cli {
@@ -17,9 +19,10 @@ constexpr std::array kCompletenessRules = {measures::CompletenessRule::kMax, mea
                                            measures::CompletenessRule::kClippedSum};
 
 struct CalibrationOptions {
-  std::string folder;
+  std::string folder;  // A recording...
   int object_id = 0;
-  std::string store;  // Judges its one object's stored measures; empty = models are drawn.
+  std::optional<simulation::WorldParams> world;  // ...or the first object of a simulated world.
+  std::string store;                             // Judges its one object's stored measures; empty = models are drawn.
   std::vector<int> views = {2, 4, 8, 16};
   int draws = 10;                   // Models for each number of views.
   int max_trials = 160;             // Virtual images with the object, of one model.
@@ -42,13 +45,15 @@ struct JudgedModel {
 };
 
 struct CalibrationTrial {
+  int taught = 0;                                // Frames to learn from that show enough of the object...
+  int offered = 0;                               // ...of so many.
   std::vector<assessment::HeldOutFrame> frames;  // Those of the recording, then those without the object.
   std::vector<JudgedModel> models;
 };
 
-// Views are learned at true poses from even ids; odd ids judge, found in colour alone. `progress` is called from any thread, one at
-// a time. Throws std::runtime_error where a recording or the store lacks what is needed, or the store's measures are of other
-// settings.
+// Views are learned at true poses from even ids; odd ids judge, found in colour alone. Numbers of views that the object cannot be
+// learned with are left out: a plain one may have no model at all. `progress` is called from any thread, one at a time. Throws
+// std::runtime_error where a recording or the store lacks what is needed, or the store's measures are of other settings.
 CalibrationTrial TryCalibration(const CalibrationOptions& options, const params::LibraryParams& params,
                                 const std::function<void(int done, int of)>& progress = {});
 

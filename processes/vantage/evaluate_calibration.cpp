@@ -1,5 +1,6 @@
 // vantage evaluate calibration: whether probabilities learned from virtual views hold in frames nothing was learned from.
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 
 #include "vantage/calibration_trial.h"
@@ -10,9 +11,29 @@ namespace {
 struct Options {
   CommonOptions common;
   CalibrationOptions trial;
+  std::vector<std::string> meshes;
   bool quick = false;
   std::string out;
 };
+
+// A table and walls with photographs on them: what is around an object is not plain.
+simulation::WorldParams SimulatedRoom(const std::string& mesh) {
+  simulation::WorldParams room;
+  room.table_texture = "fruits.jpg";
+  room.table_tile_m = 0.6;
+  room.wall_texture = "leuvenA.jpg";
+  return simulation::WorldWithMeshes(room, {mesh});
+}
+
+Json Try(const CalibrationOptions& options, const params::LibraryParams& params, const std::string& out) {
+  const CalibrationTrial trial = TryCalibration(options, params, [](int done, int of) {
+    std::cerr << "\r" << done << " of " << of << " models" << (done == of ? "\n" : "") << std::flush;
+  });
+  Json figures = FiguresOf(trial, options.seed);
+  figures["seed"] = options.seed;
+  if (!out.empty()) SaveCalibration(trial, figures, out);
+  return figures;
+}
 
 void RunEvaluateCalibration(const Options& options) {
   CheckOutput(options.common);
@@ -25,13 +46,24 @@ void RunEvaluateCalibration(const Options& options) {
     trial_options.max_trials = 48;
     trial_options.absent_step = 4;
   }
-  const CalibrationTrial trial = TryCalibration(trial_options, params, [](int done, int of) {
-    std::cerr << "\r" << done << " of " << of << " models" << (done == of ? "\n" : "") << std::flush;
-  });
-  Json figures = FiguresOf(trial, trial_options.seed);
-  figures["seed"] = trial_options.seed;
-  if (!options.out.empty()) SaveCalibration(trial, figures, options.out);
-  WriteResult(options.common, figures, TableOf(figures));
+  if (options.meshes.empty()) {
+    if (trial_options.folder.empty()) throw std::runtime_error("say of what: --sequence DIR --object-id N, or --mesh FILE[,...]");
+    if (trial_options.object_id == 0) throw std::runtime_error("--sequence needs --object-id N");
+    const Json figures = Try(trial_options, params, options.out);
+    return WriteResult(options.common, figures, TableOf(figures));
+  }
+  Json objects = Json::array();
+  std::string text;
+  for (const std::string& mesh : options.meshes) {
+    trial_options.world = SimulatedRoom(mesh);
+    const std::string name = trial_options.world->objects.front().name;
+    std::cerr << name << ":\n";
+    Json figures = Try(trial_options, params, options.out.empty() ? "" : (std::filesystem::path(options.out) / name).string());
+    text += name + "\n" + TableOf(figures);
+    figures["object"] = name;
+    objects.push_back(std::move(figures));
+  }
+  WriteResult(options.common, {{"objects", objects}}, text);
 }
 
 }  // namespace
@@ -41,12 +73,17 @@ void AddEvaluateCalibration(CLI::App& evaluate, Run& run) {
   CLI::App* verb = evaluate.add_subcommand(
       "calibration", "Measures learned from virtual views alone, held against frames of a recording that nothing was learned from");
   AddCommonOptions(*verb, options->common);
-  verb->add_option("--sequence", options->trial.folder,
-                   "BOP scene folder with depth, labels and truth: even ids teach, odd ids judge")
-      ->required()
-      ->type_name("DIR");
+  CLI::Option* sequence = verb->add_option("--sequence", options->trial.folder,
+                                           "BOP scene folder with depth, labels and truth: even ids teach, odd ids judge")
+                              ->type_name("DIR");
+  verb->add_option("--mesh", options->meshes,
+                   "Instead: objects on a simulated table, one after another, each seen 96 times by a Kinect; half of the looks "
+                   "teach, half judge, and again with the object gone")
+      ->delimiter(',')
+      ->excludes(sequence)
+      ->check(CLI::ExistingFile)
+      ->type_name("FILE[,...]");
   verb->add_option("--object-id", options->trial.object_id, "The object of scene_gt.json that is learned and looked for")
-      ->required()
       ->check(CLI::Range(1, 1000000))
       ->type_name("N");
   CLI::Option* store =

@@ -77,7 +77,7 @@ FeatureSetting ParseFeatureSetting(const std::string& text) {
 std::vector<FeatureFigures> TryFeatures(const rgbd::BopScene& scene, const std::vector<int>& ids, int object_id, int folds,
                                         const std::vector<FeatureSetting>& settings,
                                         const recognition::RecogniserParams& recogniser_params) {
-  const KnownObject known(scene, object_id);
+  const RecordedObject known(scene, object_id);
   const Eigen::Matrix3Xd surface = known.Surface(ids);
   std::vector<FeatureFigures> figures(settings.size());
   for (int fold = 0; fold < folds; ++fold) {

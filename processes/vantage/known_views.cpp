@@ -1,8 +1,11 @@
 #include "vantage/known_views.h"
 
+#include <array>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "geometry/view_sphere.h"
 #include "learning/keyframe.h"
 #include "vantage/sequence.h"
 
@@ -14,24 +17,30 @@ constexpr int kLabelBorder = 3;   // Pixels of the label's border that are not l
 constexpr int kSurfaceStep = 12;  // Every so manieth pixel of every so manieth row is a point of the true surface.
 const char* const kName = "object";
 
+// Of simulated looks.
+constexpr double kMinElevationRad = 15.0 * M_PI / 180.0;
+constexpr double kMaxElevationRad = 75.0 * M_PI / 180.0;
+constexpr double kMaxRollRad = 15.0 * M_PI / 180.0;
+constexpr std::array kDistancesM = {0.45, 0.6, 0.8};
+
 }  // namespace
 
-KnownObject::KnownObject(const rgbd::BopScene& scene, int object_id) : scene_(scene), object_id_(object_id) {
+RecordedObject::RecordedObject(const rgbd::BopScene& scene, int object_id) : scene_(scene), object_id_(object_id) {
   const auto label = LabelOfObject(scene, object_id);
   if (!label) throw std::runtime_error(scene.folder().string() + ": has no label/; learning at known poses needs it");
   label_ = *label;
 }
 
-cv::Mat KnownObject::Mask(int id) const { return scene_.LoadLabel(id) == label_; }
+cv::Mat RecordedObject::Mask(int id) const { return scene_.LoadLabel(id) == label_; }
 
-std::optional<geometry::Rigid> KnownObject::TruePose(int id) const { return TruthOf(scene_, id, object_id_); }
+std::optional<geometry::Rigid> RecordedObject::TruePose(int id) const { return TruthOf(scene_, id, object_id_); }
 
-Eigen::Matrix3Xd KnownObject::Surface(const std::vector<int>& ids) const {
+Eigen::Matrix3Xd KnownFrames::Surface(const std::vector<int>& ids) const {
   std::vector<Eigen::Vector3d> points;
   for (const int id : ids) {
     const auto T_camera_mesh = TruePose(id);
     if (!T_camera_mesh) continue;
-    const rgbd::Frame frame = scene_.Load(id);
+    const rgbd::Frame frame = Load(id);
     const cv::Mat mask = Mask(id);
     for (int y = 0; y < mask.rows && !frame.depth.empty(); y += kSurfaceStep) {
       for (int x = 0; x < mask.cols; x += kSurfaceStep) {
@@ -41,13 +50,12 @@ Eigen::Matrix3Xd KnownObject::Surface(const std::vector<int>& ids) const {
     }
   }
   if (points.empty()) {
-    throw std::runtime_error(scene_.folder().string() + ": no frame has depth on object " + std::to_string(object_id_) +
-                             "; its true surface is not known");
+    throw std::runtime_error(Where() + ": no frame has depth on the object; its true surface is not known");
   }
   return Eigen::Map<const Eigen::Matrix3Xd>(points[0].data(), 3, static_cast<Eigen::Index>(points.size()));
 }
 
-model::ObjectModel KnownObject::Learn(const std::vector<int>& ids, const features::FeatureParams& params,
+model::ObjectModel KnownFrames::Learn(const std::vector<int>& ids, const features::FeatureParams& params,
                                       const geometry::Rigid& T_mesh_object) const {
   model::ObjectModel object;
   object.name = kName;
@@ -57,12 +65,48 @@ model::ObjectModel KnownObject::Learn(const std::vector<int>& ids, const feature
     cv::Mat mask = Mask(id);
     cv::erode(mask, mask, cv::Mat(), cv::Point(-1, -1), kLabelBorder);
     if (!T_camera_mesh || cv::countNonZero(mask) == 0) continue;
-    const rgbd::Frame frame = scene_.Load(id);
+    const rgbd::Frame frame = Load(id);
     const features::Features features = features::Extract(rgbd::Gray(frame), mask, params);
     auto extended = learning::WithView(object, frame, mask, features, *T_camera_mesh * T_mesh_object, {}, kMinViewPoints);
     if (extended) object = std::move(*extended);
   }
   return object;
+}
+
+SimulatedObject::SimulatedObject(const simulation::WorldParams& params, int frames, std::uint32_t seed) {
+  simulation::SimulatedWorld world(params);
+  const simulation::TrueObject truth = world.Truth().at(0);
+  name_ = truth.name;
+  T_world_mesh_ = truth.T_world_object;
+  const Eigen::Vector3d middle = truth.T_world_object * Eigen::Vector3d(truth.points.rowwise().mean());
+  const auto directions = geometry::EvenDirections(frames);
+  const double z_min = std::sin(kMinElevationRad), z_max = std::sin(kMaxElevationRad);
+  for (int id = 0; id < frames; ++id) {
+    const Eigen::Vector3d& direction = directions[static_cast<std::size_t>(id)];
+    const double z = z_min + (z_max - z_min) * 0.5 * (direction.z() + 1.0), across = std::sqrt(1.0 - z * z);
+    const double azimuth = geometry::Azimuth(direction);
+    // Distances change with every second frame, so that even and odd ids have all of them.
+    const double distance_m = kDistancesM[static_cast<std::size_t>(id / 2) % kDistancesM.size()];
+    const Eigen::Vector3d eye = middle + distance_m * Eigen::Vector3d(across * std::cos(azimuth), across * std::sin(azimuth), z);
+    const double roll = kMaxRollRad * std::sin(2.4 * id);
+    const geometry::Rigid T_world_camera =
+        geometry::LookAt(eye, middle, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
+    const std::uint32_t frame_seed = seed * 7919u + static_cast<std::uint32_t>(id);
+    world.ShowObject(0, true);
+    frames_.push_back(world.Look(T_world_camera, frame_seed));
+    frames_.back().id = id;
+    frames_.back().utime = id;
+    masks_.push_back(world.Labels(T_world_camera) == 0);
+    world.ShowObject(0, false);
+    without_.push_back(world.Look(T_world_camera, frame_seed + 1u));
+    without_.back().id = id;
+    without_.back().utime = id;
+    ids_.push_back(id);
+  }
+}
+
+std::optional<geometry::Rigid> SimulatedObject::TruePose(int id) const {
+  return frames_.at(static_cast<std::size_t>(id)).T_world_camera->inverse() * T_world_mesh_;
 }
 
 }  // namespace vantage::cli

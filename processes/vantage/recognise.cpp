@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <filesystem>
+#include <iostream>
 #include <sstream>
 
 #include "model/store.h"
@@ -84,6 +85,8 @@ std::map<std::string, int> LoadObjects(const std::string& file, recognition::Rec
     if (!object) continue;  // Removed since it was listed.
     ids[summary.name] = TrailingNumber(summary.name, static_cast<int>(ids.size()) + 1);
     try {
+      const std::string mismatch = recognition::MeasuresMismatch(*object, recogniser.params());
+      if (!mismatch.empty()) std::cerr << "vantage recognise: " << file << ": " << mismatch << '\n';
       recogniser.Set(std::make_shared<model::ObjectModel>(std::move(*object)));
     } catch (const std::invalid_argument& error) {
       throw std::runtime_error(file + ": " + error.what());

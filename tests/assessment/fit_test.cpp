@@ -21,13 +21,14 @@ std::vector<Trial> MadeUpTrials(int count) {
     const double angle = 60.0 * (i + 0.5) / count;
     trial.rotation_rad = angle * kDegree;
     const bool correct = angle < 30.0;
-    if (angle < 45.0) trial.proposals.push_back({correct ? right(random) : wrong(random), correct});
+    if (angle < 45.0) trial.alone.push_back({correct ? right(random) : wrong(random), correct});
+    trial.together = trial.alone;
     trials.push_back(trial);
   }
   for (int i = 0; i < count / 4; ++i) {
     Trial trial;
     trial.object_shown = false;
-    if (i % 3 == 0) trial.proposals.push_back({wrong(random), false});
+    if (i % 3 == 0) trial.together.push_back({wrong(random), false});
     trials.push_back(trial);
   }
   return trials;
@@ -53,8 +54,7 @@ TEST(FitMeasures, FindsWhatTheTrialsWereMadeOf) {
 TEST(FitMeasures, RightButUnbelievedIsNotDetected) {
   std::vector<Trial> trials = MadeUpTrials(800);
   for (Trial& trial : trials) {
-    if (trial.correct() && trial.rotation_rad > 15.0 * kDegree)
-      trial.proposals.front().confidence = 0.12;  // As low as the wrong ones.
+    if (trial.correct() && trial.rotation_rad > 15.0 * kDegree) trial.alone.front().confidence = 0.12;  // As low as wrong ones.
   }
   EXPECT_LT(FitMeasures(trials, {}).predicted.HalfwayRotation(), 20.0 * kDegree);
 }
@@ -62,10 +62,23 @@ TEST(FitMeasures, RightButUnbelievedIsNotDetected) {
 TEST(FitMeasures, LessLikelyProposalsAreSamplesToo) {
   std::vector<Trial> trials = MadeUpTrials(400);
   const int before = FitMeasures(trials, {}).observed.negative().count;
-  for (int i = 0; i < 50; ++i) trials[static_cast<std::size_t>(i)].proposals.push_back({0.1, false});
+  for (int i = 0; i < 50; ++i) trials[static_cast<std::size_t>(i)].together.push_back({0.1, false});
   const measures::Measures measures = FitMeasures(trials, {});
   EXPECT_EQ(measures.observed.negative().count, before + 50);
   EXPECT_EQ(measures.predicted.trials(), 400);
+}
+
+TEST(FitMeasures, ConfidenceIsThatOfWholeModelsPredictionThatOfViewsAlone) {
+  std::vector<Trial> trials = MadeUpTrials(800);
+  const measures::Measures before = FitMeasures(trials, {});
+  for (Trial& trial : trials) {
+    if (!trial.object_shown) continue;
+    trial.together.assign(1, {0.8, true});  // Another view knows better.
+  }
+  const measures::Measures measures = FitMeasures(trials, {});
+  EXPECT_GT(measures.observed.positive().mean, 0.75);
+  EXPECT_EQ(measures.observed.positive().count, 800);
+  EXPECT_LE(measures.predicted.HalfwayRotation(), before.predicted.HalfwayRotation() + 1e-9);
 }
 
 TEST(FitMeasures, NoTrialsGiveTheDefault) {

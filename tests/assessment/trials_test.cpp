@@ -33,9 +33,15 @@ class BoardTrials : public ::testing::Test {
   static inline std::vector<cv::Mat> backgrounds_;
 };
 
+bool Same(const std::vector<Proposal>& a, const std::vector<Proposal>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Proposal& one, const Proposal& other) {
+    return one.confidence == other.confidence && one.correct == other.correct;
+  });
+}
+
 bool Same(const Trial& a, const Trial& b) {
   return a.view == b.view && a.object_shown == b.object_shown && a.rotation_rad == b.rotation_rad && a.log2_scale == b.log2_scale &&
-         a.proposals.size() == b.proposals.size() && a.confidence() == b.confidence() && a.correct() == b.correct();
+         Same(a.alone, b.alone) && Same(a.together, b.together);
 }
 
 TEST_F(BoardTrials, TheBoxTeachesItsOwnMeasures) {

@@ -90,6 +90,56 @@ TEST(Observed, BadGaussiansAreRefused) {
   EXPECT_THROW(ObservedSuccess({0.5, 0.1, 1}, {std::nan(""), 0.1, 1}, Source::kOwn), std::invalid_argument);
 }
 
+// Confidences whose true log ratio is 40 (c - 0.3).
+std::vector<ConfidenceSample> LogisticSamples(int count) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  std::vector<ConfidenceSample> samples;
+  for (int i = 0; i < count; ++i) {
+    const double c = 0.6 * uniform(random);
+    samples.push_back({c, uniform(random) < 1.0 / (1.0 + std::exp(-40.0 * (c - 0.3)))});
+  }
+  return samples;
+}
+
+TEST(Observed, EveryFitFindsTheCurveOfManySamples) {
+  const std::vector<ConfidenceSample> samples = LogisticSamples(6000);
+  for (const ObservedFit fit : {ObservedFit::kLogistic, ObservedFit::kIsotonic}) {
+    SCOPED_TRACE(ToString(fit));
+    const ObservedSuccess observed = ObservedSuccess::Fit(samples, Source::kOwn, 10.0, fit);
+    EXPECT_EQ(observed.fit(), fit);
+    ExpectMonotoneAndFinite(observed);
+    for (const double c : {0.2, 0.25, 0.3, 0.35, 0.4}) {
+      EXPECT_NEAR(observed.Probability(c), 1.0 / (1.0 + std::exp(-40.0 * (c - 0.3))), 0.06) << c;
+    }
+    EXPECT_GT(observed.Probability(0.3, 0.9), 0.8);
+  }
+}
+
+TEST(Observed, EveryFitIsUnsureOfFewSamples) {
+  for (const ObservedFit fit : {ObservedFit::kGaussians, ObservedFit::kLogistic, ObservedFit::kIsotonic}) {
+    SCOPED_TRACE(ToString(fit));
+    const ObservedSuccess observed = ObservedSuccess::Fit({{0.5, true}, {0.45, false}}, Source::kOwn, 10.0, fit);
+    ExpectMonotoneAndFinite(observed);
+    EXPECT_NEAR(observed.Probability(0.19), 0.5, 0.35);
+    EXPECT_LT(observed.Probability(0.05), 0.4);
+    ExpectMonotoneAndFinite(ObservedSuccess::Fit(std::vector<ConfidenceSample>(500, {0.5, true}), Source::kOwn, 0.0, fit));
+    ExpectMonotoneAndFinite(ObservedSuccess::Fit({{0.5, true}, {0.5, false}, {0.5, true}}, Source::kOwn, 0.0, fit));
+  }
+}
+
+TEST(Observed, CurvesThatFallAreRefused) {
+  const Gaussian positive{0.5, 0.1, 1}, negative{0.1, 0.1, 1};
+  const auto make = [&](const std::vector<Knot>& curve) {
+    return ObservedSuccess(positive, negative, Source::kOwn, ObservedFit::kIsotonic, curve);
+  };
+  EXPECT_NO_THROW(make({{0.1, -1.0}, {0.2, -1.0}, {0.3, 2.0}}));
+  EXPECT_THROW(make({}), std::invalid_argument);
+  EXPECT_THROW(make({{0.1, 1.0}, {0.2, 0.0}}), std::invalid_argument);
+  EXPECT_THROW(make({{0.2, 0.0}, {0.2, 1.0}}), std::invalid_argument);
+  EXPECT_THROW(make({{0.2, std::nan("")}}), std::invalid_argument);
+}
+
 TEST(Source, TextComesBack) {
   for (Source source : {Source::kOwn, Source::kPooled, Source::kDefault}) EXPECT_EQ(SourceFromString(ToString(source)), source);
   EXPECT_THROW(SourceFromString("mine"), std::invalid_argument);

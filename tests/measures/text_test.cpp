@@ -30,6 +30,16 @@ TEST(MeasuresText, ComesBackToTheLastBit) {
   EXPECT_EQ(ToText(after), ToText(before));
 }
 
+TEST(MeasuresText, EveryFitComesBack) {
+  for (const ObservedFit fit : {ObservedFit::kLogistic, ObservedFit::kIsotonic}) {
+    Measures before = Fitted();
+    before.observed = ObservedSuccess::Fit({{0.31, true}, {0.62, true}, {0.11, false}, {0.2, true}}, Source::kOwn, 10.0, fit);
+    const Measures after = MeasuresFromText(ToText(before));
+    EXPECT_EQ(after.observed.fit(), fit);
+    for (double x = 0.0; x <= 1.0; x += 0.01) EXPECT_EQ(after.observed.Probability(x), before.observed.Probability(x));
+  }
+}
+
 TEST(MeasuresText, BrokenTextSaysSo) {
   const std::string text = ToText(Fitted());
   EXPECT_THROW(MeasuresFromText(""), std::runtime_error);

@@ -9,7 +9,7 @@
 namespace vantage::messaging {
 namespace {
 
-ObjectMeasures SomeMeasures() {
+ObjectMeasures SomeMeasures(measures::ObservedFit fit = measures::ObservedFit::kGaussians) {
   ObjectMeasures measures;
   measures.utime = 9;
   measures.object = "mug";
@@ -17,7 +17,7 @@ ObjectMeasures SomeMeasures() {
   measures.completeness = 0.4;
   measures.measures.fingerprint = "sift;4";
   measures.measures.observed =
-      measures::ObservedSuccess::Fit({{0.7, true}, {0.8, true}, {0.1, false}, {0.2, false}}, measures::Source::kOwn);
+      measures::ObservedSuccess::Fit({{0.7, true}, {0.8, true}, {0.1, false}, {0.2, false}}, measures::Source::kOwn, 10.0, fit);
   measures.measures.predicted =
       measures::PredictedSuccess::Fit({{0.1, 0.0, true}, {0.9, 0.3, false}, {0.4, -0.3, true}}, measures::Source::kOwn);
   return measures;
@@ -35,6 +35,23 @@ TEST(AssessorMessages, MeasuresEvaluateTheSameAfterTheWire) {
   for (double x = 0.0; x <= 1.0; x += 0.05) {
     EXPECT_DOUBLE_EQ(back->measures.observed.Probability(x), measures.measures.observed.Probability(x));
     EXPECT_DOUBLE_EQ(back->measures.predicted.Probability(x, x - 0.5), measures.measures.predicted.Probability(x, x - 0.5));
+  }
+}
+
+TEST(AssessorMessages, EveryFitOfConfidencesSurvivesTheWire) {
+  for (const auto fit : {measures::ObservedFit::kLogistic, measures::ObservedFit::kIsotonic}) {
+    const auto measures = SomeMeasures(fit);
+    auto message = ToMessage(measures);
+    const auto back = FromMessage(message);
+    ASSERT_TRUE(back) << back.error;
+    EXPECT_EQ(back->measures.observed.fit(), fit);
+    for (double x = 0.0; x <= 1.0; x += 0.05) {
+      EXPECT_DOUBLE_EQ(back->measures.observed.Probability(x), measures.measures.observed.Probability(x));
+    }
+    message.knot_log_ratio.front() = 1000.0;  // Falls from there.
+    EXPECT_FALSE(FromMessage(message));
+    message.knot_log_ratio.pop_back();
+    EXPECT_FALSE(FromMessage(message));
   }
 }
 
