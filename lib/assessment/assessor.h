@@ -17,8 +17,8 @@ struct TrialParams {
   int negatives_per_view = 10;     // Images without the object, each another background as long as there are; >= 0.
   double max_rotation_deg = 60.0;  // Out of plane, uniform in 0..max; (0, 90].
   double min_elevation_deg = 0.0;  // No camera is lower (object z up): below is the table; [-90, 90).
-  double max_scale_octaves = 1.0;  // log2 scale within +-max, triangular about 0: 1 = 0.5..2 times the distance; >= 0.
-  double max_image_noise = 16.0;   // Sigma, grey levels, one of 8 even levels from 0, the lowest of three draws; >= 0.
+  double max_scale_octaves = 1.0;  // Distances +-max about the views' median, mostly near it: 1 = 0.5..2 times; >= 0.
+  double max_image_noise = 16.0;   // Sigma, grey levels: 8 even levels from 0, each half as often as the last; >= 0.
   double max_blur_px = 1.6;        // Sigma, likewise; >= 0.
   double max_brightness = 0.25;    // Relative change of brightness, and of gamma; [0, 1).
   double correct_m = 0.04;         // Mean point distance below which a detection is right; > 0.

@@ -28,10 +28,12 @@ class Dice {
   std::uint32_t Bits() { return static_cast<std::uint32_t>(random_()); }
   double Uniform(double lower, double upper) { return lower + (upper - lower) * (Bits() / 4294967296.0); }
   int Index(int count) { return static_cast<int>(static_cast<std::uint64_t>(Bits()) * static_cast<std::uint64_t>(count) >> 32); }
-  // The lowest of three draws: all levels come up, but most images of a working camera are good ones.
+  // Every level half as often as the one below: all come up, but most images of a working camera are good ones, and its own noise
+  // is in the keyframes already.
   double Level(double max) {
-    const int first = Index(kLevels), second = Index(kLevels), third = Index(kLevels);
-    return max * std::min({first, second, third}) / (kLevels - 1);
+    int level = 0;
+    while (level < kLevels - 1 && Index(2) == 1) ++level;
+    return max * level / (kLevels - 1);
   }
 
  private:
@@ -99,6 +101,11 @@ class TrialRunner {
     view_ = view;
     std::vector<int> so_far(static_cast<std::size_t>(view) + 1);
     std::iota(so_far.begin(), so_far.end(), 0);
+    std::vector<double> distances_m;
+    for (const int i : so_far) distances_m.push_back(object_.views[static_cast<std::size_t>(i)].viewpoint().distance_m);
+    const auto middle = distances_m.begin() + static_cast<std::ptrdiff_t>(distances_m.size() / 2);
+    std::nth_element(distances_m.begin(), middle, distances_m.end());
+    median_distance_m_ = *middle;
     alone_ = RecogniserOf(object_.OnlyView(view));
     together_ = RecogniserOf(object_.OnlyViews(so_far));
   }
@@ -115,9 +122,10 @@ class TrialRunner {
       if (Elevation(VirtualCameraPose(View(), pose)) >= params_.min_elevation_deg * M_PI / 180.0) break;
     }
     pose.roll_rad = dice.Uniform(-M_PI, M_PI);
-    // The mean of two: objects are mostly met at about the distance they were learned at.
-    const double scale = dice.Uniform(-params_.max_scale_octaves, params_.max_scale_octaves);
-    pose.log2_scale = trial.log2_scale = 0.5 * (scale + dice.Uniform(-params_.max_scale_octaves, params_.max_scale_octaves));
+    // The mean of four: objects are mostly met at about the distances they were learned at.
+    double nearer = 0.0;
+    for (int i = 0; i < 4; ++i) nearer += 0.25 * dice.Uniform(-params_.max_scale_octaves, params_.max_scale_octaves);
+    pose.log2_scale = trial.log2_scale = std::log2(View().viewpoint().distance_m / median_distance_m_) + nearer;
     const Disturbance disturbance = RandomDisturbance(&dice, &trial);
 
     const geometry::Rigid T_camera_object = VirtualCameraPose(View(), pose);
@@ -233,6 +241,7 @@ class TrialRunner {
   std::unique_ptr<recognition::Recogniser> alone_;     // The view.
   std::unique_ptr<recognition::Recogniser> together_;  // All views up to this one.
   int view_ = 0;
+  double median_distance_m_ = 1.0;  // Of the views up to this one.
 };
 
 }  // namespace
