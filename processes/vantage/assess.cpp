@@ -1,22 +1,31 @@
 // vantage assess: learns an object's measures from virtual views of its stored model, and how complete the model is.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <iostream>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
 #include "assessment/assessor.h"
 #include "assessment/background.h"
+#include "geometry/view_sphere.h"
 #include "model/store.h"
+#include "vantage/trial_record.h"
 #include "vantage/verb.h"
 
 namespace vantage::cli {
 namespace {
 
+constexpr int kFullImages = 10000;            // An object; the paper's scale.
+constexpr std::size_t kFullBackgrounds = 16;  // Interest points of each are found once for every view.
+
 struct AssessOptions {
   CommonOptions common;
   std::string store;
-  std::string object;       // Empty = every one.
-  std::string backgrounds;  // Folder of images; empty = what is around the objects in their own views.
+  std::string object;        // Empty = every one.
+  std::string backgrounds;   // Folder of images; empty = what is around the objects in their own views.
+  bool full = false;         // As many virtual images as the paper had.
+  std::string predict;       // Only say how likely this object would be detected...
+  std::vector<double> from;  // ...from this place of the camera in the object's frame, metres.
 };
 
 // The folder's images by name; other files are passed over.
@@ -82,6 +91,92 @@ Json ToJson(const model::ObjectModel& object, const measures::Measures& fitted, 
   return entry;
 }
 
+void Tell(const std::string& name, int done, int of) {
+  if (done % 10 == 0 || done == of) std::cerr << '\r' << name << ": " << done << " of " << of << " virtual images" << std::flush;
+  if (done == of) std::cerr << '\n';
+}
+
+// Evenly chosen.
+std::vector<cv::Mat> AtMost(std::size_t count, const std::vector<cv::Mat>& images) {
+  std::vector<cv::Mat> chosen;
+  for (std::size_t i = 0; i < std::min(count, images.size()); ++i) {
+    chosen.push_back(images[i * images.size() / std::min(count, images.size())]);
+  }
+  return chosen;
+}
+
+// View by view, each with those before it as the assessor process has them, and each on disk before the next.
+std::vector<assessment::Trial> FullTrials(const AssessOptions& options, const model::ObjectModel& object,
+                                          const std::vector<cv::Mat>& all_backgrounds, const params::LibraryParams& params) {
+  const std::vector<cv::Mat> backgrounds = AtMost(kFullBackgrounds, all_backgrounds);
+  const int views = static_cast<int>(object.views.size());
+  assessment::TrialParams trials = params.trials;
+  trials.trials_per_view = std::max(1, (kFullImages + views - 1) / views - trials.negatives_per_view);
+  const std::string key = object.name + "|" + params.recogniser.Fingerprint() + "|" + std::to_string(trials.trials_per_view) + "|" +
+                          std::to_string(trials.seed) + "|" + options.backgrounds;
+  TrialRecord record(options.store + ".trials", key);
+  std::vector<assessment::Trial> result;
+  std::vector<int> so_far;
+  for (int view = 0; view < views; ++view) {
+    so_far.push_back(view);
+    const model::View& learned = object.views[static_cast<std::size_t>(view)];
+    if (record.Find(learned.id, learned.utime) == nullptr) {
+      const std::string name = object.name + ", view " + std::to_string(view + 1) + " of " + std::to_string(views);
+      record.Add(learned.id, learned.utime,
+                 assessment::RunTrials(object.OnlyViews(so_far), view, backgrounds, params.recogniser, trials,
+                                       [&](int done, int of) { Tell(name, done, of); }));
+    }
+    const auto& known = *record.Find(learned.id, learned.utime);
+    result.insert(result.end(), known.begin(), known.end());
+  }
+  return result;
+}
+
+std::vector<assessment::Trial> TrialsOf(const AssessOptions& options, const model::ObjectModel& object,
+                                        const std::vector<cv::Mat>& backgrounds, const params::LibraryParams& params) {
+  if (options.full) return FullTrials(options, object, backgrounds, params);
+  return assessment::RunTrials(object, 0, backgrounds, params.recogniser, params.trials,
+                               [&](int done, int of) { Tell(object.name, done, of); });
+}
+
+// How likely the object would be detected from a place, by its stored measures.
+void RunPredict(const AssessOptions& options) {
+  CheckOutput(options.common);
+  const params::LibraryParams params = LoadParams(options.common);
+  const model::Store store(options.store, model::Store::Mode::kRead);
+  const std::optional<model::ObjectModel> object = store.Load(options.predict);
+  if (!object) throw std::runtime_error(options.store + ": no object '" + options.predict + "'; see vantage models list");
+  if (object->views.empty()) throw std::runtime_error(options.store + ": object '" + options.predict + "' has no views");
+  const std::string mismatch = recognition::MeasuresMismatch(*object, params.recogniser);
+  if (!mismatch.empty()) throw std::runtime_error(options.store + ": " + mismatch);
+  const Eigen::Vector3d place(options.from[0], options.from[1], options.from[2]);
+  if (!(place.norm() > 0.01)) throw std::runtime_error("--from: the camera would be inside the object");
+  const measures::Viewpoint query{place.normalized(), place.norm()};
+  const measures::PredictedSuccess& predicted = object->measures.predicted;
+  const double probability = measures::DetectionProbability(object->viewpoints(), query, predicted, params.planner.rule);
+  // The view that says most for it.
+  int best = 0;
+  double most = -1.0, rotation_deg = 0.0;
+  for (const model::View& view : object->views) {
+    const double p = measures::DetectionProbability({view.viewpoint()}, query, predicted);
+    if (p <= most) continue;
+    most = p;
+    best = view.id;
+    rotation_deg = geometry::AngleBetween(view.viewpoint().direction, query.direction) * 180.0 / M_PI;
+  }
+  Json result = {{"object", object->name},
+                 {"from", options.from},
+                 {"probability", probability},
+                 {"source", measures::ToString(predicted.source())},
+                 {"view", best},
+                 {"rotation_deg", rotation_deg}};
+  std::ostringstream summary;
+  summary.precision(3);
+  summary << object->name << " would be detected with probability " << probability << " from there (" << rotation_deg
+          << " degrees from view " << best << "; measures: " << measures::ToString(predicted.source()) << ")\n";
+  WriteResult(options.common, result, summary.str());
+}
+
 std::vector<std::string> NamesToAssess(const AssessOptions& options, const model::Store& store) {
   std::vector<std::string> names;
   for (const model::Store::Summary& summary : store.List()) {
@@ -111,8 +206,8 @@ void RunAssess(const AssessOptions& options) {
     const std::optional<model::ObjectModel> object = store.Load(name);
     if (!object) throw std::runtime_error(options.store + ": object '" + name + "' was removed meanwhile");
     if (object->views.empty()) throw std::runtime_error(options.store + ": object '" + name + "' has no views; learn it again");
-    const std::vector<assessment::Trial> trials = assessment::RunTrials(
-        *object, 0, options.backgrounds.empty() ? OwnBackgrounds(*object) : backgrounds, params.recogniser, params.trials);
+    const std::vector<assessment::Trial> trials =
+        TrialsOf(options, *object, options.backgrounds.empty() ? OwnBackgrounds(*object) : backgrounds, params);
     const measures::Measures fitted = assessment::FitMeasures(trials, params.recogniser, params.trials.observed_fit);
     const std::vector<measures::WeightedViewpoint> directions = assessment::UniformViewpoints(
         params.candidates.min_elevation_rad, params.candidates.max_elevation_rad, {MedianDistance(*object)});
@@ -137,7 +232,24 @@ void AddAssess(CLI::App& app, Run& run) {
   verb->add_option("--backgrounds", options->backgrounds,
                    "Folder of images the virtual views are pasted over (default: what is around the object in its own views)")
       ->type_name("DIR");
-  verb->callback([options, &run] { run = [options] { RunAssess(*options); }; });
+  CLI::Option* full =
+      verb->add_flag("--full", options->full,
+                     "As many virtual images as the paper had, about 10 000 an object (an hour); they are kept in FILE.trials, and "
+                     "a run that was stopped goes on from there");
+  CLI::Option* predict =
+      verb->add_option("--predict", options->predict,
+                       "Learn nothing; say how likely this object would be detected from --from, by its measures")
+          ->type_name("NAME")
+          ->excludes(full);
+  verb->add_option("--from", options->from, "Where the camera would stand, in the object's frame (metres), looking at it")
+      ->delimiter(',')
+      ->expected(3)
+      ->needs(predict)
+      ->type_name("X,Y,Z");
+  verb->callback([options, &run] {
+    if (!options->predict.empty() && options->from.size() != 3) throw CLI::ValidationError("--predict", "needs --from X,Y,Z");
+    run = [options] { options->predict.empty() ? RunAssess(*options) : RunPredict(*options); };
+  });
 }
 
 }  // namespace vantage::cli
