@@ -23,7 +23,7 @@ struct AssessOptions {
   std::string store;
   std::string object;        // Empty = every one.
   std::string backgrounds;   // Folder of images; empty = what is around the objects in their own views.
-  bool full = false;         // As many virtual images as the paper had.
+  int images = 0;            // Virtual images an object, kept on disk; 0 = as many as the parameters say, not kept.
   std::string predict;       // Only say how likely this object would be detected...
   std::vector<double> from;  // ...from this place of the camera in the object's frame, metres.
 };
@@ -106,12 +106,12 @@ std::vector<cv::Mat> AtMost(std::size_t count, const std::vector<cv::Mat>& image
 }
 
 // View by view, each with those before it as the assessor process has them, and each on disk before the next.
-std::vector<assessment::Trial> FullTrials(const AssessOptions& options, const model::ObjectModel& object,
+std::vector<assessment::Trial> KeptTrials(const AssessOptions& options, const model::ObjectModel& object,
                                           const std::vector<cv::Mat>& all_backgrounds, const params::LibraryParams& params) {
   const std::vector<cv::Mat> backgrounds = AtMost(kFullBackgrounds, all_backgrounds);
   const int views = static_cast<int>(object.views.size());
   assessment::TrialParams trials = params.trials;
-  trials.trials_per_view = std::max(1, (kFullImages + views - 1) / views - trials.negatives_per_view);
+  trials.trials_per_view = std::max(1, (options.images + views - 1) / views - trials.negatives_per_view);
   const std::string key = object.name + "|" + params.recogniser.Fingerprint() + "|" + std::to_string(trials.trials_per_view) + "|" +
                           std::to_string(trials.seed) + "|" + options.backgrounds;
   TrialRecord record(options.store + ".trials", key);
@@ -134,7 +134,7 @@ std::vector<assessment::Trial> FullTrials(const AssessOptions& options, const mo
 
 std::vector<assessment::Trial> TrialsOf(const AssessOptions& options, const model::ObjectModel& object,
                                         const std::vector<cv::Mat>& backgrounds, const params::LibraryParams& params) {
-  if (options.full) return FullTrials(options, object, backgrounds, params);
+  if (options.images > 0) return KeptTrials(options, object, backgrounds, params);
   return assessment::RunTrials(object, 0, backgrounds, params.recogniser, params.trials,
                                [&](int done, int of) { Tell(object.name, done, of); });
 }
@@ -232,10 +232,16 @@ void AddAssess(CLI::App& app, Run& run) {
   verb->add_option("--backgrounds", options->backgrounds,
                    "Folder of images the virtual views are pasted over (default: what is around the object in its own views)")
       ->type_name("DIR");
+  CLI::Option* images =
+      verb->add_option("--images", options->images,
+                       "So many virtual images an object, kept in FILE.trials as they come: a run that was stopped goes on from "
+                       "there, and a model that grew needs its new views only")
+          ->check(CLI::Range(1, 10000000))
+          ->type_name("N");
   CLI::Option* full =
-      verb->add_flag("--full", options->full,
-                     "As many virtual images as the paper had, about 10 000 an object (an hour); they are kept in FILE.trials, and "
-                     "a run that was stopped goes on from there");
+      verb->add_flag_callback(
+              "--full", [options] { options->images = kFullImages; }, "The paper's scale: --images 10000 (half an hour an object)")
+          ->excludes(images);
   CLI::Option* predict =
       verb->add_option("--predict", options->predict,
                        "Learn nothing; say how likely this object would be detected from --from, by its measures")

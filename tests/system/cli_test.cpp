@@ -228,6 +228,8 @@ TEST_F(Cli, StoresThatAreNone) {
   EXPECT_EQ(ReadFile(folder_ / "notes.txt"), std::string(4000, 'x'));
   ExpectRefused("recognise --sequence plain --store none.db", "vantage recognise", {"none.db", "no such store"});
   ExpectRefused("assess --store none.db", "vantage assess", {"none.db", "no such store"});
+  ExpectRefused("assess --store none.db --predict mug --from 0,0,1", "vantage assess", {"none.db", "no such store"});
+  ExpectRefused("assess --store none.db --predict mug", "vantage assess", {"--predict", "--from"});
   ExpectRefused("models show box --store none.db", "vantage models show", {"none.db", "no such store"});
   ExpectRefused("learn --sequence plain --store none/a.db", "vantage learn", {"none"});
   ExpectRefused("learn --sequence plain --store plain", "vantage learn", {"plain", "folder"});
@@ -389,6 +391,44 @@ TEST_F(Cli, AVocabularyIsTrainedAndShown) {
   cv::imwrite((folder_ / "empty" / "grey.png").string(), cv::Mat(48, 64, CV_8UC1, cv::Scalar(90)));
   EXPECT_NE(Run("vocabulary train empty --out c.voc").err.find("no interest points"), std::string::npos);
   EXPECT_EQ(Files(), (std::vector<std::string>{"a.voc", "b.voc", "empty", "photos"}));
+}
+
+TEST_F(Cli, AssessmentGoesOnWhereItWasStoppedAndPredicts) {
+  VANTAGE_NEEDS_DATA("ycbv");
+  const std::string data = fs::absolute(testing::DataFolder()).string();
+  Outcome outcome = Run("learn --sequence '" + data + "/ycbv' --object-id 9 --frames 1:2 --use-known-poses --store s.db");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::string name = Json::parse(Run("models list --store s.db --json -").out)["objects"][0]["name"];
+  outcome = Run("assess --store s.db --images 14 --json first.json");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("virtual images"), std::string::npos) << outcome.err;
+  // As after a crash: the last line is cut off, and what came before counts.
+  std::ofstream(folder_ / "s.db.trials", std::ios::app) << "{\"key\": \"";
+  outcome = Run("assess --store s.db --images 14 --json again.json");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_EQ(ReadFile(folder_ / "first.json"), ReadFile(folder_ / "again.json"));
+  // From where it was learned, and from behind.
+  const Json shown = Json::parse(Run("models show '" + name + "' --store s.db --json -").out);
+  const Json& T = shown["views"][0]["T_camera_object"];  // Row-major; the camera is at -R^T t.
+  double place[3];
+  for (int i = 0; i < 3; ++i) {
+    place[i] = 0.0;
+    for (int k = 0; k < 3; ++k)
+      place[i] -= T[static_cast<std::size_t>(4 * k + i)].get<double>() * T[static_cast<std::size_t>(4 * k + 3)].get<double>();
+  }
+  const auto predict = [&](double sign) {
+    std::ostringstream arguments;
+    arguments << "assess --store s.db --predict '" << name << "' --json - --from=" << sign * place[0] << ',' << sign * place[1]
+              << ',' << sign * place[2];
+    const Outcome answer = Run(arguments.str());
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    return Json::parse(answer.out);
+  };
+  EXPECT_GT(predict(1.0)["probability"], 0.5);
+  EXPECT_LT(predict(1.0)["rotation_deg"], 0.1);
+  EXPECT_EQ(predict(-1.0)["probability"], 0.0);
+  EXPECT_EQ(predict(1.0)["source"], "own");
 }
 
 }  // namespace
