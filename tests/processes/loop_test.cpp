@@ -102,7 +102,7 @@ TEST(Loop, ExploresAWorldAndStopsForAStatedReason) {
   // What is in the store is what was learned, measures included.
   const auto stored = model::Store(store, model::Store::Mode::kRead).Load("box");
   ASSERT_TRUE(stored);
-  EXPECT_EQ(static_cast<int>(stored->views.size()), planner.status().views);
+  EXPECT_GE(static_cast<int>(stored->views.size()), planner.status().views);  // The learner goes on after the planner stopped.
 
   // The assessor is asked by another: from a learned view the object is likely detected, from the far side less so.
   const auto ask = [&](const geometry::Rigid& T_object_camera) {
