@@ -102,6 +102,8 @@ TEST(Loop, ExploresAWorldAndStopsForAStatedReason) {
   // What is in the store is what was learned, measures included.
   const auto stored = model::Store(store, model::Store::Mode::kRead).Load("box");
   ASSERT_TRUE(stored);
+  ASSERT_TRUE(learner.learner().object());
+  EXPECT_EQ(stored->views.size(), learner.learner().object()->views.size());
   EXPECT_GE(static_cast<int>(stored->views.size()), planner.status().views);  // The learner goes on after the planner stopped.
 
   // The assessor is asked by another: from a learned view the object is likely detected, from the far side less so.
