@@ -57,7 +57,7 @@ struct Trial {
 // objects masked, or photographs); plain grey noise where empty. Only as strong interest points count as the first background would
 // have kept. Negatives are whole backgrounds, each once: it is whole models and whole images that make wrong detections.
 // Deterministic in (model, params, backgrounds); a view's dice do not depend on first_view, but views learned later change what
-// earlier ones look like from aside. `progress` is called after every trial. Cost: about 100 ms of one core a trial, two thirds of
+// earlier ones look like from aside. `progress` is called after every trial. Cost: about 90 ms of one core a trial, two thirds of
 // it interest points; and once those of every background.
 std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, const std::vector<cv::Mat>& backgrounds,
                              const recognition::RecogniserParams& recogniser, const TrialParams& params,
@@ -67,6 +67,9 @@ std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, c
 // alone. A view counts as detected where its most likely proposal is right and has p(o|c) >= 1/2.
 measures::Measures FitMeasures(const std::vector<Trial>& trials, const recognition::RecogniserParams& recogniser,
                                measures::ObservedFit observed_fit = measures::ObservedFit::kGaussians);
+
+// Of the viewpoints' distances, the upper of two middle ones, metres; 1 without viewpoints.
+double MedianDistance(const std::vector<measures::Viewpoint>& viewpoints);
 
 // Uniform p(theta) over the part of the view sphere between two elevations (radians, object z up) at the given distances.
 std::vector<measures::WeightedViewpoint> UniformViewpoints(double min_elevation_rad, double max_elevation_rad,

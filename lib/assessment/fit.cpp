@@ -28,6 +28,15 @@ measures::Measures FitMeasures(const std::vector<Trial>& trials, const recogniti
   return measures;
 }
 
+double MedianDistance(const std::vector<measures::Viewpoint>& viewpoints) {
+  if (viewpoints.empty()) return 1.0;
+  std::vector<double> distances_m;
+  for (const measures::Viewpoint& viewpoint : viewpoints) distances_m.push_back(viewpoint.distance_m);
+  const auto middle = distances_m.begin() + static_cast<std::ptrdiff_t>(distances_m.size() / 2);
+  std::nth_element(distances_m.begin(), middle, distances_m.end());
+  return *middle;
+}
+
 std::vector<measures::WeightedViewpoint> UniformViewpoints(double min_elevation_rad, double max_elevation_rad,
                                                            const std::vector<double>& distances_m, int directions) {
   if (!(min_elevation_rad < max_elevation_rad) || min_elevation_rad >= M_PI_2 || max_elevation_rad <= -M_PI_2) {

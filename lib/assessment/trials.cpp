@@ -101,11 +101,9 @@ class TrialRunner {
     view_ = view;
     std::vector<int> so_far(static_cast<std::size_t>(view) + 1);
     std::iota(so_far.begin(), so_far.end(), 0);
-    std::vector<double> distances_m;
-    for (const int i : so_far) distances_m.push_back(object_.views[static_cast<std::size_t>(i)].viewpoint().distance_m);
-    const auto middle = distances_m.begin() + static_cast<std::ptrdiff_t>(distances_m.size() / 2);
-    std::nth_element(distances_m.begin(), middle, distances_m.end());
-    median_distance_m_ = *middle;
+    auto viewpoints = object_.viewpoints();
+    viewpoints.resize(so_far.size());
+    median_distance_m_ = MedianDistance(viewpoints);
     alone_ = RecogniserOf(object_.OnlyView(view));
     together_ = RecogniserOf(object_.OnlyViews(so_far));
   }

@@ -24,14 +24,6 @@ WorkerParams MakeWorkerParams(const AssessorNodeParams& params) {
   return worker;
 }
 
-double MedianDistance(const std::vector<measures::Viewpoint>& views) {
-  std::vector<double> distances;
-  for (const auto& view : views) distances.push_back(view.distance_m);
-  if (distances.empty()) return 1.0;
-  std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2), distances.end());
-  return distances[distances.size() / 2];
-}
-
 }  // namespace
 
 void AssessorNodeParams::Check() const {
@@ -228,7 +220,7 @@ void AssessorNode::OnAssessment(const Assessment& assessment) {
 
 double AssessorNode::CompletenessOf(const Object& object) const {
   const auto queries = object.reach.empty() ? assessment::UniformViewpoints(params_.min_elevation_rad, params_.max_elevation_rad,
-                                                                            {MedianDistance(object.viewpoints)})
+                                                                            {assessment::MedianDistance(object.viewpoints)})
                                             : object.reach;
   return measures::Completeness(object.viewpoints, queries, object.measures.predicted, rule_);
 }
@@ -240,7 +232,7 @@ void AssessorNode::Publish(const std::string& name, const Object& object) {
   completeness.rule = rule_;
   completeness.completeness = CompletenessOf(object);
   completeness.reach_known = !object.reach.empty();
-  completeness.distance_m = MedianDistance(object.viewpoints);
+  completeness.distance_m = assessment::MedianDistance(object.viewpoints);
   completeness.sphere = geometry::ViewSphere(params_.azimuth_cells, params_.elevation_cells);
   for (int cell = 0; cell < completeness.sphere.size(); ++cell) {
     const measures::Viewpoint query{completeness.sphere.Direction(cell), completeness.distance_m};

@@ -53,12 +53,6 @@ std::vector<cv::Mat> OwnBackgrounds(const model::ObjectModel& object) {
   return images;
 }
 
-double MedianDistance(const model::ObjectModel& object) {
-  std::vector<double> distances_m;
-  for (const measures::Viewpoint& viewpoint : object.viewpoints()) distances_m.push_back(viewpoint.distance_m);
-  return Quantile(distances_m, 0.5);
-}
-
 Json ToJson(const measures::Gaussian& gaussian) {
   return {{"mean", gaussian.mean}, {"sigma", gaussian.sigma}, {"count", gaussian.count}};
 }
@@ -105,29 +99,45 @@ std::vector<cv::Mat> AtMost(std::size_t count, const std::vector<cv::Mat>& image
   return chosen;
 }
 
-// View by view, each with those before it as the assessor process has them, and each on disk before the next.
+// What kept trials hold for: all that they depend on but their number.
+std::string KeyOf(const AssessOptions& options, const std::string& object, const params::LibraryParams& params) {
+  std::string key = object + "|" + options.backgrounds;
+  for (const auto& [name, value] : params::Flatten(params)) {
+    const bool of_trials = name.rfind("recogniser.", 0) == 0 || name.rfind("trials.", 0) == 0;
+    if (of_trials && name != "trials.trials_per_view" && name != "trials.observed_fit") key += "|" + name + "=" + value;
+  }
+  return key;
+}
+
+int Shown(const std::vector<assessment::Trial>& trials) {
+  return static_cast<int>(
+      std::count_if(trials.begin(), trials.end(), [](const assessment::Trial& one) { return one.object_shown; }));
+}
+
+// View by view, each with those before it as the assessor process has them, and each on disk before the next. A view that has
+// enough trials keeps all of them.
 std::vector<assessment::Trial> KeptTrials(const AssessOptions& options, const model::ObjectModel& object,
                                           const std::vector<cv::Mat>& all_backgrounds, const params::LibraryParams& params) {
   const std::vector<cv::Mat> backgrounds = AtMost(kFullBackgrounds, all_backgrounds);
   const int views = static_cast<int>(object.views.size());
   assessment::TrialParams trials = params.trials;
   trials.trials_per_view = std::max(1, (options.images + views - 1) / views - trials.negatives_per_view);
-  const std::string key = object.name + "|" + params.recogniser.Fingerprint() + "|" + std::to_string(trials.trials_per_view) + "|" +
-                          std::to_string(trials.seed) + "|" + options.backgrounds;
-  TrialRecord record(options.store + ".trials", key);
+  TrialRecord record(options.store + ".trials", KeyOf(options, object.name, params));
   std::vector<assessment::Trial> result;
   std::vector<int> so_far;
   for (int view = 0; view < views; ++view) {
     so_far.push_back(view);
     const model::View& learned = object.views[static_cast<std::size_t>(view)];
-    if (record.Find(learned.id, learned.utime) == nullptr) {
+    if (learned.points.empty() || learned.keyframe.depth.empty()) continue;  // Nothing that could be shown or recognised.
+    const auto* known = record.Find(learned.id, learned.utime);
+    if (known == nullptr || Shown(*known) < trials.trials_per_view) {
       const std::string name = object.name + ", view " + std::to_string(view + 1) + " of " + std::to_string(views);
       record.Add(learned.id, learned.utime,
                  assessment::RunTrials(object.OnlyViews(so_far), view, backgrounds, params.recogniser, trials,
                                        [&](int done, int of) { Tell(name, done, of); }));
+      known = record.Find(learned.id, learned.utime);
     }
-    const auto& known = *record.Find(learned.id, learned.utime);
-    result.insert(result.end(), known.begin(), known.end());
+    result.insert(result.end(), known->begin(), known->end());
   }
   return result;
 }
@@ -209,8 +219,9 @@ void RunAssess(const AssessOptions& options) {
     const std::vector<assessment::Trial> trials =
         TrialsOf(options, *object, options.backgrounds.empty() ? OwnBackgrounds(*object) : backgrounds, params);
     const measures::Measures fitted = assessment::FitMeasures(trials, params.recogniser, params.trials.observed_fit);
-    const std::vector<measures::WeightedViewpoint> directions = assessment::UniformViewpoints(
-        params.candidates.min_elevation_rad, params.candidates.max_elevation_rad, {MedianDistance(*object)});
+    const std::vector<measures::WeightedViewpoint> directions =
+        assessment::UniformViewpoints(params.candidates.min_elevation_rad, params.candidates.max_elevation_rad,
+                                      {assessment::MedianDistance(object->viewpoints())});
     const double completeness = measures::Completeness(object->viewpoints(), directions, fitted.predicted, params.planner.rule);
     store.SaveMeasures(name, fitted, completeness);
     result["objects"].push_back(ToJson(*object, fitted, trials, completeness));
@@ -238,10 +249,10 @@ void AddAssess(CLI::App& app, Run& run) {
                        "there, and a model that grew needs its new views only")
           ->check(CLI::Range(1, 10000000))
           ->type_name("N");
-  CLI::Option* full =
-      verb->add_flag_callback(
-              "--full", [options] { options->images = kFullImages; }, "The paper's scale: --images 10000 (half an hour an object)")
-          ->excludes(images);
+  CLI::Option* full = verb->add_flag_callback(
+                              "--full", [options] { options->images = kFullImages; },
+                              "The paper's scale: --images 10000 (a quarter of an hour of one core an object)")
+                          ->excludes(images);
   CLI::Option* predict =
       verb->add_option("--predict", options->predict,
                        "Learn nothing; say how likely this object would be detected from --from, by its measures")

@@ -69,14 +69,14 @@ class Field {
   // Frames that judge, then those without the object.
   std::vector<assessment::HeldOutFrame> HeldOut() const {
     std::vector<assessment::HeldOutFrame> frames;
-    for (const int id : judged_ids_) frames.push_back(HeldOutFrame(known_->Load(id), known_->TruePose(id)));
+    for (const int id : judged_ids_) frames.push_back(WithoutDepth(known_->Load(id), known_->TruePose(id)));
     for (std::size_t i = 0; simulated_ && i < judged_ids_.size(); i += static_cast<std::size_t>(options_.absent_step)) {
-      frames.push_back(HeldOutFrame(simulated_->Without(judged_ids_[i]), std::nullopt));
+      frames.push_back(WithoutDepth(simulated_->Without(judged_ids_[i]), std::nullopt));
     }
     for (const std::string& folder : options_.absent) {
       const rgbd::BopScene absent(folder);
       for (std::size_t i = 0; i < absent.ids().size(); i += static_cast<std::size_t>(options_.absent_step)) {
-        frames.push_back(HeldOutFrame(absent.Load(absent.ids()[i]), std::nullopt));
+        frames.push_back(WithoutDepth(absent.Load(absent.ids()[i]), std::nullopt));
       }
     }
     const recognition::Recogniser recogniser(params_.recogniser);
@@ -111,7 +111,7 @@ class Field {
   }
 
  private:
-  assessment::HeldOutFrame HeldOutFrame(rgbd::Frame frame, const std::optional<geometry::Rigid>& T_camera_mesh) const {
+  assessment::HeldOutFrame WithoutDepth(rgbd::Frame frame, const std::optional<geometry::Rigid>& T_camera_mesh) const {
     assessment::HeldOutFrame held_out;
     held_out.frame = std::move(frame);
     held_out.frame.depth = cv::Mat();

@@ -73,9 +73,9 @@ model::ObjectModel KnownFrames::Learn(const std::vector<int>& ids, const feature
   return object;
 }
 
-SimulatedObject::SimulatedObject(const simulation::WorldParams& params, int frames, std::uint32_t seed) {
-  simulation::SimulatedWorld world(params);
-  const simulation::TrueObject truth = world.Truth().at(0);
+SimulatedObject::SimulatedObject(const simulation::WorldParams& params, int frames, std::uint32_t seed)
+    : world_(params), seed_(seed * 7919u) {
+  const simulation::TrueObject truth = world_.Truth().at(0);
   name_ = truth.name;
   T_world_mesh_ = truth.T_world_object;
   const Eigen::Vector3d middle = truth.T_world_object * Eigen::Vector3d(truth.points.rowwise().mean());
@@ -91,18 +91,22 @@ SimulatedObject::SimulatedObject(const simulation::WorldParams& params, int fram
     const double roll = kMaxRollRad * std::sin(2.4 * id);
     const geometry::Rigid T_world_camera =
         geometry::LookAt(eye, middle, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
-    const std::uint32_t frame_seed = seed * 7919u + static_cast<std::uint32_t>(id);
-    world.ShowObject(0, true);
-    frames_.push_back(world.Look(T_world_camera, frame_seed));
+    frames_.push_back(world_.Look(T_world_camera, seed_ + static_cast<std::uint32_t>(id)));
     frames_.back().id = id;
     frames_.back().utime = id;
-    masks_.push_back(world.Labels(T_world_camera) == 0);
-    world.ShowObject(0, false);
-    without_.push_back(world.Look(T_world_camera, frame_seed + 1u));
-    without_.back().id = id;
-    without_.back().utime = id;
+    masks_.push_back(world_.Labels(T_world_camera) == 0);
     ids_.push_back(id);
   }
+}
+
+rgbd::Frame SimulatedObject::Without(int id) {
+  world_.ShowObject(0, false);
+  rgbd::Frame frame =
+      world_.Look(*frames_.at(static_cast<std::size_t>(id)).T_world_camera, ~seed_ + static_cast<std::uint32_t>(id));
+  world_.ShowObject(0, true);
+  frame.id = id;
+  frame.utime = id;
+  return frame;
 }
 
 std::optional<geometry::Rigid> SimulatedObject::TruePose(int id) const {

@@ -21,7 +21,7 @@ class TrialRecord {
   // Throws std::runtime_error where the file cannot be read or appended to.
   TrialRecord(std::filesystem::path file, std::string key);
 
-  // Null where there are none. `utime`: of the view; the same id at another time is another view.
+  // The trials added last; null where there are none. `utime`: of the view; the same id at another time is another view.
   const std::vector<assessment::Trial>* Find(int view_id, std::int64_t utime) const;
 
   // On disk when it returns. Throws std::runtime_error where it cannot be written.

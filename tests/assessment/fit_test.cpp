@@ -100,6 +100,13 @@ TEST(TrialParams, NamesTheFieldOutOfRange) {
   }
 }
 
+TEST(MedianDistance, IsTheMiddleOneInAnyOrder) {
+  const auto at = [](double distance_m) { return measures::Viewpoint{Eigen::Vector3d::UnitX(), distance_m}; };
+  EXPECT_EQ(MedianDistance({}), 1.0);
+  EXPECT_EQ(MedianDistance({at(0.9), at(0.4), at(0.5)}), 0.5);
+  EXPECT_EQ(MedianDistance({at(0.9), at(0.4), at(0.5), at(0.6)}), 0.6);
+}
+
 TEST(UniformViewpoints, CoverTheBandEvenly) {
   const auto viewpoints = UniformViewpoints(10.0 * kDegree, 60.0 * kDegree, {0.5, 0.8}, 400);
   ASSERT_EQ(viewpoints.size(), 800u);

@@ -180,6 +180,32 @@ TEST(Recogniser, ObjectsWithoutViewsOrPointsAreNeverFound) {
   EXPECT_EQ(recogniser.size(), 0);
 }
 
+TEST(Recogniser, MeasuresOfOtherSettingsAreNotUsedButThoseOfOtherObjects) {
+  const RecogniserParams params;
+  Recogniser recogniser(params);
+  const measures::ObservedSuccess own({0.5, 0.1, 100}, {0.1, 0.05, 100}, measures::Source::kOwn);
+  const auto with = [&](const std::string& name, int texture, const std::string& fingerprint) {
+    auto object = Learned(name, Texture(texture), params);
+    object->measures.observed = own;
+    object->measures.fingerprint = fingerprint;
+    return object;
+  };
+  const auto old = with("old", 1, "other settings");
+  EXPECT_NE(MeasuresMismatch(*old, params).find("'old'"), std::string::npos);
+  EXPECT_EQ(MeasuresMismatch(*Learned("new", Texture(1), params), params), "");
+  recogniser.Set(old);
+  const auto source = [&] { return Recognise(recogniser, FrameWith({{Texture(1), {60, 200}}})).at(0).source; };
+  EXPECT_EQ(source(), measures::Source::kDefault);
+  recogniser.Set(with("other", 2, params.Fingerprint()));
+  EXPECT_EQ(source(), measures::Source::kPooled);
+  EXPECT_NEAR(recogniser.Pooled().positive().mean, 0.5, 1e-12);
+  recogniser.Set(with("old", 1, params.Fingerprint()));
+  EXPECT_EQ(source(), measures::Source::kOwn);
+  recogniser.Remove("other");
+  recogniser.Remove("old");
+  EXPECT_EQ(recogniser.Pooled().source(), measures::Source::kDefault);
+}
+
 TEST(Recogniser, IsTheSameOnEveryRun) {
   Recogniser recogniser{RecogniserParams{}};
   recogniser.Set(Learned("plate", Texture(1), recogniser.params()));

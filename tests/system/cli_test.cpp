@@ -408,6 +408,10 @@ TEST_F(Cli, AssessmentGoesOnWhereItWasStoppedAndPredicts) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
   EXPECT_EQ(ReadFile(folder_ / "first.json"), ReadFile(folder_ / "again.json"));
+  // What is kept for more images is enough for fewer, but not with other parameters.
+  EXPECT_EQ(Run("assess --store s.db --images 12").err, "");
+  std::ofstream(folder_ / "other.yaml") << "trials:\n  max_blur_px: 0.5\n";
+  EXPECT_NE(Run("assess --store s.db --images 12 --config other.yaml").err, "");
   // From where it was learned, and from behind.
   const Json shown = Json::parse(Run("models show '" + name + "' --store s.db --json -").out);
   const Json& T = shown["views"][0]["T_camera_object"];  // Row-major; the camera is at -R^T t.
