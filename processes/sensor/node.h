@@ -32,8 +32,12 @@ class SensorNode : public messaging::Node {
   std::int64_t frames() const { return frames_; }
 
  protected:
-  std::string State() const override { return source_->Ended() ? "ended" : paused_ ? "paused" : "streaming"; }
-  std::string Detail() const override { return source_->Name(); }
+  std::string State() const override {
+    return source_->Ended() ? "ended" : paused_ ? "paused" : source_->Waiting() ? "waiting" : "streaming";
+  }
+  std::string Detail() const override {
+    return source_->Name() + (source_->Ended() ? ": ended after " + std::to_string(frames_) + " frames" : "");
+  }
 
  private:
   SensorNodeParams params_;

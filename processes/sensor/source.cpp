@@ -1,5 +1,6 @@
 #include "sensor/source.h"
 
+#include <chrono>
 #include <stdexcept>
 
 #include "rgbd/openni/openni_source.h"
@@ -31,31 +32,91 @@ class RecordingSource : public FrameSource {
   std::size_t next_ = 0;
 };
 
+constexpr int kTimeout_ms = 500;  // The process stays responsive where a device is silent.
+constexpr int kMaxSilences = 6;   // So many in a row, and it is opened anew.
+constexpr std::chrono::seconds kLookEvery{1};
+
 class OpenNiFrames : public FrameSource {
  public:
-  OpenNiFrames(const std::string& uri, bool loop) : source_(Params(uri, loop)) {}
+  explicit OpenNiFrames(const OpenNiOptions& options) : record_(options.record) {
+    params_.uri = options.uri;
+    params_.repeat = options.loop;
+    params_.width = options.width;
+    params_.height = options.height;
+    params_.fps = options.fps;
+    params_.calibration = options.calibration;
+    params_.record = options.record;
+    params_.record_lossless = options.record_lossless;
+    params_.timeout_ms = kTimeout_ms;
+    Open();
+  }
 
   std::optional<rgbd::Frame> Next(const std::optional<geometry::Rigid>& T_world_camera) override {
-    auto frame = source_.Next();
+    if (!source_ && !Reopen()) return std::nullopt;
+    auto frame = Read();
     ended_ = !frame;
     if (!frame) return frame;
+    frame->id = next_id_++;
     frame->T_world_camera = T_world_camera;
-    if (source_.is_recording()) frame->utime = 0;
+    if (source_->is_recording()) frame->utime = 0;
     return frame;
   }
   bool Ended() const override { return ended_; }
-  std::string Name() const override { return source_.uri(); }
+  bool Waiting() const override { return !source_; }
+  std::string Name() const override { return name_; }
 
  private:
-  static rgbd::OpenNiParams Params(const std::string& uri, bool loop) {
-    rgbd::OpenNiParams params;
-    params.uri = uri;
-    params.repeat = loop;
-    params.timeout_ms = 500;  // The process stays responsive where a device is silent.
-    return params;
+  void Open() {
+    source_ = std::make_unique<rgbd::OpenNiSource>(params_);
+    name_ = source_->uri() + ": " + source_->modes();
+    silences_ = 0;
+    if (source_->is_recording()) return;
+    params_.uri = source_->uri();  // The same device again, wherever it is plugged in.
+    params_.elsewhere = true;
   }
 
-  rgbd::OpenNiSource source_;
+  // Throws what keeps it from being opened.
+  bool Reopen() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next_look_) return false;
+    next_look_ = now + kLookEvery;
+    if (!record_.empty()) {
+      const std::filesystem::path file(record_);
+      params_.record =
+          (file.parent_path() / (file.stem().string() + "-" + std::to_string(opened_ + 1) + file.extension().string())).string();
+    }
+    Open();
+    ++opened_;
+    return true;
+  }
+
+  std::optional<rgbd::Frame> Read() {
+    try {
+      auto frame = source_->Next();
+      silences_ = 0;
+      return frame;
+    } catch (const rgbd::DeviceGone&) {
+      Close();
+      throw;
+    } catch (const std::runtime_error&) {
+      if (!source_->is_recording() && ++silences_ >= kMaxSilences) Close();
+      throw;
+    }
+  }
+
+  void Close() {
+    source_.reset();
+    next_look_ = std::chrono::steady_clock::now() + kLookEvery;
+  }
+
+  rgbd::OpenNiParams params_;
+  std::string record_;
+  std::unique_ptr<rgbd::OpenNiSource> source_;  // None while the device is not there.
+  std::string name_;
+  std::chrono::steady_clock::time_point next_look_;
+  int opened_ = 1;
+  int silences_ = 0;
+  std::int64_t next_id_ = 0;
   bool ended_ = false;
 };
 
@@ -83,9 +144,7 @@ std::unique_ptr<FrameSource> MakeRecordingSource(const std::filesystem::path& fo
   return std::make_unique<RecordingSource>(folder, frames, loop);
 }
 
-std::unique_ptr<FrameSource> MakeOpenNiSource(const std::string& uri, bool loop) {
-  return std::make_unique<OpenNiFrames>(uri, loop);
-}
+std::unique_ptr<FrameSource> MakeOpenNiSource(const OpenNiOptions& options) { return std::make_unique<OpenNiFrames>(options); }
 
 std::unique_ptr<FrameSource> MakeWorldSource(std::shared_ptr<const simulation::World> world, std::uint32_t seed) {
   return std::make_unique<WorldSource>(std::move(world), seed);

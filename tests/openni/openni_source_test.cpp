@@ -62,9 +62,9 @@ TEST(OpenNiRecording, TakesTheDepthStreamsFieldOfViewWhereColourSaysNone) {
   EXPECT_NEAR(source.camera().fy, 575.0, 2.0);
   EXPECT_DOUBLE_EQ(source.camera().cx, 319.5);
   OpenNiParams params = Params(Recording());
-  params.camera = geometry::PinholeCamera{640, 480, 525, 525, 320, 240};
-  EXPECT_EQ(OpenNiSource(params).Next()->camera, *params.camera);
-  params.camera->width = 320;
+  params.calibration = CameraCalibration{{640, 480, 525, 525, 320, 240}, {}};
+  EXPECT_EQ(OpenNiSource(params).Next()->camera, params.calibration->camera);
+  params.calibration->camera.width = 320;
   EXPECT_NE(Complaint(params).find("320x480"), std::string::npos) << Complaint(params);
 }
 
@@ -142,7 +142,7 @@ TEST(OpenNi, ALiveDeviceStreamsFramesOfNow) {
     int frames = 0;
     try {
       OpenNiParams params = Params("Dummy");
-      params.camera = geometry::PinholeCamera{320, 240, 290, 290, 159.5, 119.5};
+      params.calibration = CameraCalibration{{320, 240, 290, 290, 159.5, 119.5}, {}};
       auto* source = new OpenNiSource(params);
       const auto now = std::chrono::system_clock::now().time_since_epoch();
       const std::int64_t now_us = std::chrono::duration_cast<std::chrono::microseconds>(now).count();

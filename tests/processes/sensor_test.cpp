@@ -41,7 +41,9 @@ TEST(Sensor, PlaysAnOpenNiRecording) {
   messaging::FrameReceiver receiver(bus);
   SensorNodeParams params;
   params.rate_hz = 100.0;
-  SensorNode node(bus, MakeOpenNiSource((testing::DataFolder() / "oni" / "kinect_12_frames.oni").string(), false), params);
+  OpenNiOptions options;
+  options.uri = (testing::DataFolder() / "oni" / "kinect_12_frames.oni").string();
+  SensorNode node(bus, MakeOpenNiSource(options), params);
   EXPECT_EQ(messaging::RunNodes(bus, {&node}, nullptr), messaging::RunEnd::kFinished);
   bus.Drain();
   EXPECT_GE(receiver.frames(), 10);
@@ -55,7 +57,9 @@ TEST(Sensor, PlaysAnOpenNiRecording) {
 TEST(Sensor, SourcesThatAreNotThereSaySo) {
   EXPECT_THROW(MakeRecordingSource("/no/such/folder", "all", false), std::runtime_error);
   try {
-    MakeOpenNiSource("/no/such/file.oni", false);
+    OpenNiOptions options;
+    options.uri = "/no/such/file.oni";
+    MakeOpenNiSource(options);
     FAIL() << "accepted";
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("/no/such/file.oni"), std::string::npos) << error.what();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -14,12 +15,16 @@
 #include <thread>
 #include <vector>
 
+#include "rgbd/openni/video_mode.h"
+
 namespace vantage::rgbd {
 namespace {
 
 constexpr std::size_t kLongestQueue = 30;  // Frames of one stream that wait for the other: a second's worth.
 
 constexpr std::chrono::milliseconds kSettle{30};
+
+constexpr int kLookEvery_ms = 100;  // A device that is unplugged is noticed so soon.
 
 // OpenNI's last complaint on one line.
 std::string Complaint() {
@@ -46,6 +51,24 @@ class Library {
   Library& operator=(const Library&) = delete;
 };
 
+// Hears when a device is unplugged, from a thread of OpenNI's.
+class GoneListener : public openni::OpenNI::DeviceDisconnectedListener {
+ public:
+  explicit GoneListener(std::string uri) : uri_(std::move(uri)) { openni::OpenNI::addDeviceDisconnectedListener(this); }
+  ~GoneListener() { openni::OpenNI::removeDeviceDisconnectedListener(this); }
+  void onDeviceDisconnected(const openni::DeviceInfo* device) override {
+    if (uri_ == device->getUri()) gone_ = true;
+  }
+  bool gone() const { return gone_; }
+
+ private:
+  std::string uri_;
+  std::atomic<bool> gone_{false};
+};
+
+// "1d27/0609@3/12" -> "1d27/0609": what it is, without where it is plugged in.
+std::string Kind(const std::string& uri) { return uri.substr(0, uri.find('@')); }
+
 struct TimedImage {
   std::int64_t time_us = 0;  // The stream's own clock, repeats laid end to end.
   cv::Mat image;
@@ -62,39 +85,6 @@ struct Stream {
   std::size_t loop = 0;  // How often the recording started again.
 };
 
-cv::Mat Wrap(const openni::VideoFrameRef& frame, int type) {
-  return {frame.getHeight(), frame.getWidth(), type, const_cast<void*>(frame.getData()),
-          static_cast<std::size_t>(frame.getStrideInBytes())};
-}
-
-// A copy in our format: BGR or millimetres. Empty for a format that is not supported.
-cv::Mat Convert(const openni::VideoFrameRef& frame) {
-  cv::Mat image;
-  switch (frame.getVideoMode().getPixelFormat()) {
-    case openni::PIXEL_FORMAT_RGB888:
-      cv::cvtColor(Wrap(frame, CV_8UC3), image, cv::COLOR_RGB2BGR);
-      break;
-    case openni::PIXEL_FORMAT_YUV422:
-      cv::cvtColor(Wrap(frame, CV_8UC2), image, cv::COLOR_YUV2BGR_UYVY);
-      break;
-    case openni::PIXEL_FORMAT_YUYV:
-      cv::cvtColor(Wrap(frame, CV_8UC2), image, cv::COLOR_YUV2BGR_YUYV);
-      break;
-    case openni::PIXEL_FORMAT_GRAY8:
-      cv::cvtColor(Wrap(frame, CV_8UC1), image, cv::COLOR_GRAY2BGR);
-      break;
-    case openni::PIXEL_FORMAT_DEPTH_1_MM:
-      image = Wrap(frame, CV_16UC1).clone();
-      break;
-    case openni::PIXEL_FORMAT_DEPTH_100_UM:
-      Wrap(frame, CV_16UC1).convertTo(image, CV_16UC1, 0.1);
-      break;
-    default:
-      break;
-  }
-  return image;
-}
-
 double Focal(int size_px, double field_of_view_rad) { return 0.5 * size_px / std::tan(0.5 * field_of_view_rad); }
 
 }  // namespace
@@ -103,27 +93,39 @@ void OpenNiParams::Check() const {
   if (!(std::isfinite(speed) && speed >= 0.0))
     throw std::invalid_argument("openni: speed must be >= 0, is " + std::to_string(speed));
   if (timeout_ms <= 0) throw std::invalid_argument("openni: timeout_ms must be > 0, is " + std::to_string(timeout_ms));
-  if (camera) camera->Check();
+  if (width < 0 || height < 0 || (width > 0) != (height > 0))
+    throw std::invalid_argument("openni: width and height must be > 0, or both 0, are " + std::to_string(width) + " and " +
+                                std::to_string(height));
+  if (fps < 0) throw std::invalid_argument("openni: fps must be >= 0, is " + std::to_string(fps));
+  if (calibration) calibration->Check();
 }
 
 class OpenNiSource::Implementation {
  public:
-  explicit Implementation(const OpenNiParams& params) : params_(params) {
+  explicit Implementation(const OpenNiParams& params) : params_(params), uri_(params.uri) {
     Open();
     OpenStream(color_, openni::SENSOR_COLOR, "colour");
     OpenStream(depth_, openni::SENSOR_DEPTH, "depth");
+    ChooseModes();
     if (device_.isImageRegistrationModeSupported(openni::IMAGE_REGISTRATION_DEPTH_TO_COLOR))
       device_.setImageRegistrationMode(openni::IMAGE_REGISTRATION_DEPTH_TO_COLOR);
     registered_ = device_.getImageRegistrationMode() == openni::IMAGE_REGISTRATION_DEPTH_TO_COLOR;
-    if (!device_.isFile()) device_.setDepthColorSyncEnabled(true);  // Where it cannot, pairing by time does.
+    // Where it cannot, pairing by time does.
+    in_step_ =
+        !device_.isFile() && device_.setDepthColorSyncEnabled(true) == openni::STATUS_OK && device_.getDepthColorSyncEnabled();
     FindCamera();
-    const int fps = std::max(1, depth_.video.getVideoMode().getFps());
-    interval_us_ = 1000000 / fps;
+    interval_us_ = 1000000 / std::max(1, depth_.video.getVideoMode().getFps());
+    if (!params_.record.empty()) PrepareRecording();
     for (Stream* stream : {&color_, &depth_})
-      if (stream->video.start() != openni::STATUS_OK) Fail(params_.uri, "expected the streams to start, found: " + Complaint());
+      if (stream->video.start() != openni::STATUS_OK) Fail(uri_, "expected the streams to start, found: " + Complaint());
+    if (recorder_.isValid() && !is_recording()) StartRecording();
   }
 
   ~Implementation() {
+    if (recorder_.isValid()) {
+      recorder_.stop();
+      recorder_.destroy();
+    }
     Stop();
     // The file driver's thread walks its list of streams without a lock; with all of them stopped it only looks every 10 ms.
     // Streams that go while it spins at the end of a file crash it.
@@ -147,29 +149,58 @@ class OpenNiSource::Implementation {
     color_.waiting.pop_front();
     depth_.waiting.pop_front();
     Fit(frame);
+    if (undistorter_) undistorter_->Undistort(frame);
     frame.utime = Epoch(time_us) + time_us;
     Pace(time_us);
     return frame;
   }
 
-  const OpenNiParams& params() const { return params_; }
+  const std::string& uri() const { return uri_; }
   bool is_recording() const { return device_.isFile(); }
   int recorded_frames() const { return is_recording() ? std::min(color_.frames, depth_.frames) : 0; }
   bool registered() const { return registered_; }
+  bool in_step() const { return in_step_; }
+  std::string modes() const {
+    return "colour " + Describe(color_.video.getVideoMode()) + ", depth " + Describe(depth_.video.getVideoMode()) +
+           (registered_ ? ", registered" : "") + (in_step_ ? ", in step" : "");
+  }
   const geometry::PinholeCamera& camera() const { return camera_; }
 
  private:
   void Open() {
-    const std::string& uri = params_.uri;
-    const bool is_file = uri.size() > 4 && uri.compare(uri.size() - 4, 4, ".oni") == 0;
-    if (is_file && !std::filesystem::is_regular_file(uri))
-      Fail(uri, "expected an .oni recording, found no such file; check the path");
-    if (device_.open(uri.empty() ? openni::ANY_DEVICE : uri.c_str()) == openni::STATUS_OK) {
-      SetUpPlayback();
-      return;
+    const bool is_file = uri_.size() > 4 && uri_.compare(uri_.size() - 4, 4, ".oni") == 0;
+    if (is_file && !std::filesystem::is_regular_file(uri_))
+      Fail(uri_, "expected an .oni recording, found no such file; check the path");
+    std::string listed;
+    if (!is_file) uri_ = FindDevice(listed);
+    gone_.emplace(uri_);
+    if (device_.open(uri_.c_str()) == openni::STATUS_OK) return SetUpPlayback();
+    if (is_file) Fail(uri_, "expected an .oni recording, found: " + Complaint() + "; is it whole, and made by OpenNI2?");
+    if ((", " + listed + ", ").find(", " + uri_ + ", ") == std::string::npos) FailMissing(listed);
+    Fail(uri_, "the device is there, but cannot be opened: " + Complaint() +
+                   "; may this user open it (scripts/doctor says how), is another program using it?");
+  }
+
+  // The URI of the device that is meant; `listed`: of all that OpenNI knows (it may open others).
+  std::string FindDevice(std::string& listed) const {
+    openni::Array<openni::DeviceInfo> devices;
+    openni::OpenNI::enumerateDevices(&devices);
+    std::string of_the_kind;
+    bool there = false;
+    for (int i = 0; i < devices.getSize(); ++i) {
+      const std::string uri = devices[i].getUri();
+      there = there || uri == uri_;
+      if ((uri_.empty() || (params_.elsewhere && Kind(uri) == Kind(uri_))) && of_the_kind.empty()) of_the_kind = uri;
+      listed += (listed.empty() ? "" : ", ") + uri;
     }
-    if (is_file) Fail(uri, "expected an .oni recording, found: " + Complaint() + "; is it whole, and made by OpenNI2?");
-    Fail(uri, "expected a device, found: " + Complaint() + "; is it plugged in, and may this user open it? Or name an .oni file");
+    if (!there && !of_the_kind.empty()) return of_the_kind;
+    if (uri_.empty()) FailMissing(listed);
+    return uri_;
+  }
+
+  [[noreturn]] void FailMissing(const std::string& listed) const {
+    Fail(uri_, "expected a device, found " + (listed.empty() ? "none" : listed) +
+                   "; is it plugged in, with a driver (scripts/doctor looks for both)? Or name an .oni file");
   }
 
   // A recording left running at its end would keep a core busy.
@@ -183,30 +214,82 @@ class OpenNiSource::Implementation {
     openni::PlaybackControl* playback = device_.getPlaybackControl();
     if (!playback) return;
     // Frames come when they are asked for, so that none is lost; Pace() keeps the time.
-    if (playback->setSpeed(-1.0F) != openni::STATUS_OK)
-      Fail(params_.uri, "expected control of the playback, found: " + Complaint());
+    if (playback->setSpeed(-1.0F) != openni::STATUS_OK) Fail(uri_, "expected control of the playback, found: " + Complaint());
     playback->setRepeatEnabled(params_.repeat);
   }
 
   void OpenStream(Stream& stream, openni::SensorType type, const std::string& name) {
     if (!device_.hasSensor(type))
-      Fail(params_.uri, "expected a " + name + " stream, found none; an RGB-D camera or recording of both streams is needed");
+      Fail(uri_, "expected a " + name + " stream, found none; an RGB-D camera or recording of both streams is needed");
     if (stream.video.create(device_, type) != openni::STATUS_OK)
-      Fail(params_.uri, "expected the " + name + " stream to open, found: " + Complaint());
+      Fail(uri_, "expected the " + name + " stream to open, found: " + Complaint());
     if (!device_.isFile()) stream.video.setMirroringEnabled(false);
     stream.mirrored = stream.video.getMirroringEnabled();
     if (openni::PlaybackControl* playback = device_.getPlaybackControl()) stream.frames = playback->getNumberOfFrames(stream.video);
   }
 
+  // Sets the modes that are wanted; a recording's are as they are.
+  void ChooseModes() {
+    const openni::SensorInfo& color = color_.video.getSensorInfo();
+    const auto mode = ChooseMode(color, color_.video.getVideoMode(), {params_.width, params_.height, params_.fps});
+    if (!mode) FailMode("colour", params_.width, params_.height, color);
+    SetMode(color_, *mode, "colour");
+    const int width = mode->getResolutionX(), height = mode->getResolutionY();
+    const openni::SensorInfo& depth = depth_.video.getSensorInfo();
+    const auto depth_mode = ChooseDepthMode(depth, depth_.video.getVideoMode(), width, height, params_.fps);
+    if (!depth_mode) FailMode("depth of the shape", width, height, depth);
+    SetMode(depth_, *depth_mode, "depth");
+  }
+
+  [[noreturn]] void FailMode(const std::string& what, int width, int height, const openni::SensorInfo& sensor) const {
+    Fail(uri_, "expected " + what + (width > 0 ? " " + std::to_string(width) + "x" + std::to_string(height) : "") +
+                   (params_.fps > 0 ? " at " + std::to_string(params_.fps) + " Hz" : "") + ", found " + DescribeAll(sensor) +
+                   "; choose one of these");
+  }
+
+  void SetMode(Stream& stream, const openni::VideoMode& mode, const std::string& name) {
+    const openni::VideoMode now = stream.video.getVideoMode();
+    if (device_.isFile() || (mode.getPixelFormat() == now.getPixelFormat() && mode.getResolutionX() == now.getResolutionX() &&
+                             mode.getResolutionY() == now.getResolutionY() && mode.getFps() == now.getFps()))
+      return;
+    if (stream.video.setVideoMode(mode) != openni::STATUS_OK)
+      Fail(uri_, "expected " + name + " in " + Describe(mode) + ", found: " + Complaint());
+  }
+
+  void PrepareRecording() {
+    const std::string& file = params_.record;
+    if (std::filesystem::exists(file)) Fail(file, "expected a new recording, found that file there; name another");
+    if (recorder_.create(file.c_str()) != openni::STATUS_OK ||
+        recorder_.attach(color_.video, !params_.record_lossless) != openni::STATUS_OK ||
+        recorder_.attach(depth_.video, false) != openni::STATUS_OK || (is_recording() && recorder_.start() != openni::STATUS_OK))
+      Fail(file, "expected to record there, found: " + Complaint() + "; does its folder exist, and may it be written?");
+  }
+
+  // OpenNI's recorder calls the first frame of either stream time 0. So it starts just after a pair came, when the next is far.
+  void StartRecording() {
+    const auto least = std::chrono::microseconds(interval_us_ / 3);
+    for (bool waited = false; !waited;) {
+      color_.waiting.clear();
+      depth_.waiting.clear();
+      const auto begin = std::chrono::steady_clock::now();
+      while (!DropUnpaired()) ReadOne();
+      waited = std::chrono::steady_clock::now() - begin > least;
+    }
+    color_.waiting.clear();
+    depth_.waiting.clear();
+    if (recorder_.start() != openni::STATUS_OK) Fail(params_.record, "expected to record there, found: " + Complaint());
+  }
+
   void FindCamera() {
     const openni::VideoMode mode = color_.video.getVideoMode();
     const int width = mode.getResolutionX(), height = mode.getResolutionY();
-    if (params_.camera) {
-      camera_ = *params_.camera;
+    if (params_.calibration) {
+      camera_ = params_.calibration->camera;
       if (camera_.width != width || camera_.height != height)
-        Fail(params_.uri, "expected a camera of " + std::to_string(camera_.width) + "x" + std::to_string(camera_.height) +
-                              " as configured, found " + std::to_string(width) + "x" + std::to_string(height) +
-                              "; set the intrinsics of this device");
+        Fail(uri_, "expected colour of " + std::to_string(camera_.width) + "x" + std::to_string(camera_.height) +
+                       " as calibrated, found " + std::to_string(width) + "x" + std::to_string(height) +
+                       "; choose that mode, or calibrate in this one");
+      undistorter_.emplace(*params_.calibration);
       return;
     }
     for (Stream* stream : {&color_, &depth_}) {
@@ -215,30 +298,36 @@ class OpenNiSource::Implementation {
       camera_ = {width, height, Focal(width, across), Focal(height, down), 0.5 * (width - 1), 0.5 * (height - 1)};
       return;
     }
-    Fail(params_.uri, "expected a field of view, found 0 for both streams; set the camera's intrinsics");
+    Fail(uri_, "expected a field of view, found 0 for both streams; calibrate the camera (vantage calibrate) and name the file");
   }
 
   // Waits for either stream and takes one image from it. False at the end of a recording.
   bool ReadOne() {
     std::array<openni::VideoStream*, 2> videos{&color_.video, &depth_.video};
     int ready = -1;
-    const openni::Status status = openni::OpenNI::waitForAnyStream(videos.data(), 2, &ready, params_.timeout_ms);
+    openni::Status status = openni::STATUS_TIME_OUT;
+    for (int waited_ms = 0; waited_ms < params_.timeout_ms && status == openni::STATUS_TIME_OUT; waited_ms += kLookEvery_ms) {
+      CheckPlugged();
+      const int wait_ms = std::min(kLookEvery_ms, params_.timeout_ms - waited_ms);
+      status = openni::OpenNI::waitForAnyStream(videos.data(), 2, &ready, wait_ms);
+    }
+    CheckPlugged();
     if (status == openni::STATUS_TIME_OUT) {
       if (is_recording() && (color_.frames == 0 || depth_.frames == 0)) return false;  // Nobody knows its length.
-      Fail(params_.uri, "expected a frame within " + std::to_string(params_.timeout_ms) + " ms, found none; " +
-                            (is_recording() ? "is the recording cut off?" : "is the device still plugged in?"));
+      Fail(uri_, "expected a frame within " + std::to_string(params_.timeout_ms) + " ms, found none; " +
+                     (is_recording() ? "is the recording cut off?" : "the device is plugged in, but silent"));
     }
     Stream& stream = ready == 0 ? color_ : depth_;
     openni::VideoFrameRef frame;
     if (status != openni::STATUS_OK || stream.video.readFrame(&frame) != openni::STATUS_OK || !frame.isValid())
-      Fail(params_.uri, "expected a frame, found: " + Complaint());
+      Fail(uri_, "expected a frame, found: " + Complaint());
     TimedImage timed;
     timed.time_us = Unroll(stream, static_cast<std::int64_t>(frame.getTimestamp()));
     stream.last_index = frame.getFrameIndex();
     timed.image = Convert(frame);
     if (timed.image.empty() || (timed.image.type() == CV_16UC1) != (&stream == &depth_))
-      Fail(params_.uri, "expected RGB888, YUV422, YUYV or GRAY8 colour and depth in 1 mm or 0.1 mm, found pixel format " +
-                            std::to_string(frame.getVideoMode().getPixelFormat()) + "; set another mode");
+      Fail(uri_, "expected RGB888, YUV422, YUYV or GRAY8 colour and depth in 1 mm or 0.1 mm, found pixel format " +
+                     std::to_string(frame.getVideoMode().getPixelFormat()) + "; set another mode");
     if (stream.mirrored) {
       cv::Mat flipped;
       cv::flip(timed.image, flipped, 1);
@@ -247,6 +336,10 @@ class OpenNiSource::Implementation {
     stream.waiting.push_back(std::move(timed));
     if (stream.waiting.size() > kLongestQueue) stream.waiting.pop_front();
     return true;
+  }
+
+  void CheckPlugged() const {
+    if (gone_->gone()) throw DeviceGone(uri_ + ": the device was unplugged");
   }
 
   // The time with repeats of a recording laid end to end.
@@ -279,11 +372,11 @@ class OpenNiSource::Implementation {
   // Depth as large as colour: a smaller or larger image of the same shape is resized, to the nearest measured value.
   void Fit(Frame& frame) const {
     if (frame.color.cols != camera_.width || frame.color.rows != camera_.height)
-      Fail(params_.uri, "expected colour of the size it started with, found another; start again");
+      Fail(uri_, "expected colour of the size it started with, found another; start again");
     if (frame.depth.size() == frame.color.size()) return;
     if (frame.depth.cols * frame.color.rows != frame.depth.rows * frame.color.cols)
-      Fail(params_.uri, "expected depth of colour's shape, found " + std::to_string(frame.depth.cols) + "x" +
-                            std::to_string(frame.depth.rows) + "; set modes of the same shape");
+      Fail(uri_, "expected depth of colour's shape, found " + std::to_string(frame.depth.cols) + "x" +
+                     std::to_string(frame.depth.rows) + "; set modes of the same shape");
     cv::Mat resized;
     cv::resize(frame.depth, resized, frame.color.size(), 0.0, 0.0, cv::INTER_NEAREST);
     frame.depth = resized;
@@ -314,11 +407,16 @@ class OpenNiSource::Implementation {
   };
 
   OpenNiParams params_;
+  std::string uri_;  // What is open.
   Library library_;  // Before all that uses it, so that it goes last.
+  std::optional<GoneListener> gone_;
   openni::Device device_;
   Stream color_, depth_;
+  openni::Recorder recorder_;
+  std::optional<Undistorter> undistorter_;
   geometry::PinholeCamera camera_;
   bool registered_ = false;
+  bool in_step_ = false;
   bool ended_ = false;
   std::int64_t interval_us_ = 33333;
   std::int64_t next_id_ = 0;
@@ -333,9 +431,11 @@ OpenNiSource::OpenNiSource(const OpenNiParams& params) {
 }
 OpenNiSource::~OpenNiSource() = default;
 std::optional<Frame> OpenNiSource::Next() { return implementation_->Next(); }
-const std::string& OpenNiSource::uri() const { return implementation_->params().uri; }
+const std::string& OpenNiSource::uri() const { return implementation_->uri(); }
 bool OpenNiSource::is_recording() const { return implementation_->is_recording(); }
 int OpenNiSource::recorded_frames() const { return implementation_->recorded_frames(); }
+bool OpenNiSource::in_step() const { return implementation_->in_step(); }
+std::string OpenNiSource::modes() const { return implementation_->modes(); }
 bool OpenNiSource::registered() const { return implementation_->registered(); }
 const geometry::PinholeCamera& OpenNiSource::camera() const { return implementation_->camera(); }
 
