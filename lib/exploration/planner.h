@@ -58,7 +58,7 @@ struct Candidate {
   // worth_s * P(detect) * gain - (t_plan + t_move + t_learn); -infinity without a path.
   double utility_s = -std::numeric_limits<double>::infinity();
   // Why it was not considered; empty where it was. "too unlikely to detect", "no gain", the mount's words ("in collision", "out of
-  // the workspace", "no path found", ...), "path not planned" (see max_path_goals); by random also "already tried".
+  // the workspace", "no path found", ...), "path not planned" (see max_path_goals); by baselines also "already tried".
   std::string refusal;
 };
 
@@ -66,7 +66,7 @@ enum class StopReason {
   kNone,               // "none": go on.
   kTargetReached,      // "target_reached"
   kNothingWorthwhile,  // "nothing_worth_its_cost"
-  kNothingReachable,   // "nothing_reachable": the mount refuses all that would be worth an attempt; random: nothing is left.
+  kNothingReachable,   // "nothing_reachable": the mount refuses all that would be worth an attempt; baselines: nothing is left.
   kTimeBudget,         // "time_budget"
   kMaxAttempts,        // "max_attempts"
   kOperator            // "operator": never by a strategy; for callers who are told to stop.
@@ -112,10 +112,31 @@ class Strategy {
   virtual void Report(const Attempt& attempt) = 0;
 };
 
-// "planner": the greatest utility, and stops where none is > 0. "random": any reachable candidate whose id was not tried yet,
-// uniformly; never stops for cost and does not ask min_detect_probability: the baseline. Throws std::invalid_argument on another
-// name and what params.Check() throws.
-std::unique_ptr<Strategy> MakeStrategy(const std::string& name, const PlannerParams& params, std::uint32_t seed);
+// The truth that only the strategy "oracle" may see: from which views an object is recognised that was learned from one view alone.
+struct OutcomeTable {
+  std::vector<measures::Viewpoint> viewpoints;
+  std::vector<char> detected;  // [learned * viewpoints.size() + seen from] != 0: the right pose was found.
+
+  bool Detected(std::size_t learned, std::size_t from) const { return detected[learned * viewpoints.size() + from] != 0; }
+  // Index of the viewpoint with the nearest direction. Throws std::logic_error where there are none.
+  std::size_t Nearest(const measures::Viewpoint& viewpoint) const;
+  void Check() const;  // Throws std::invalid_argument where it is empty or not square.
+};
+
+// Strategies by name; all but the planner and the oracle never stop for cost: baselines.
+//   planner   the greatest utility; stops where none is > 0.
+//   random    any reachable candidate whose id was not tried yet, uniformly; does not ask min_detect_probability.
+//   nearest   of those not tried, the one that takes the least time to reach.
+//   sweep     round the object in steps of 20 degrees at 3 elevations, from where the camera is at first, always to the untried
+//             candidate nearest to the next step.
+//   coverage  of those not tried and likely enough to be detected (min_detect_probability; where none is: of all), the one
+//             furthest in direction from all views learned and tried.
+//   oracle    as the planner, but P(detect) and gain are what `outcomes` says; needs it.
+// Throws std::invalid_argument on another name, for an oracle without outcomes, and what params.Check() and outcomes->Check()
+// throw. `outcomes` must outlive the strategy.
+std::unique_ptr<Strategy> MakeStrategy(const std::string& name, const PlannerParams& params, std::uint32_t seed,
+                                       const OutcomeTable* outcomes = nullptr);
+const std::vector<std::string>& StrategyNames();
 
 // Candidate views around an object: even directions between the elevations times the distances, looking at the object's origin,
 // image up towards +z of the world. Directions are even in the object's coordinates and ids name direction and distance, so a

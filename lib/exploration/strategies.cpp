@@ -1,106 +1,13 @@
 #include <algorithm>
-#include <cmath>
-#include <random>
-#include <set>
 #include <stdexcept>
 
-#include "exploration/planner.h"
-#include "exploration/scoring.h"
+#include "exploration/shared_strategy.h"
+#include "geometry/rigid.h"
 
 namespace vantage::exploration {
 namespace {
 
 constexpr double kNoGain = 1e-9;
-
-// What all strategies do the same way; they differ in Choose.
-class SharedStrategy : public Strategy {
- public:
-  SharedStrategy(const PlannerParams& params, std::uint32_t seed)
-      : params_(params),
-        seed_(seed),
-        failures_(params.failure_radius_rad, params.failure_discount),
-        t_plan_s_(params.t_plan_s),
-        t_learn_s_(params.t_learn_s) {}
-
-  Decision Decide(const Belief& belief, const std::vector<CandidateView>& candidates, const geometry::Rigid& T_world_camera,
-                  const motion::Mount& mount, double elapsed_s) final {
-    const GainScorer scorer(belief, params_.rule);
-    Decision decision;
-    decision.completeness = scorer.completeness();
-    decision.stop = StopWhateverThereIs(decision.completeness, elapsed_s);
-    if (decision.stop != StopReason::kNone) return decision;
-    for (const CandidateView& view : candidates) {
-      Candidate candidate;
-      candidate.view = view;
-      candidate.detect_probability = failures_.Factor(view.viewpoint) *
-                                     measures::DetectionProbability(belief.views, view.viewpoint, belief.predicted, params_.rule);
-      candidate.gain = scorer.Gain(view.viewpoint);
-      candidate.t_plan_s = t_plan_s_.mean();
-      candidate.t_learn_s = t_learn_s_.mean();
-      decision.candidates.push_back(candidate);
-    }
-    Choose(decision, T_world_camera, mount);
-    last_chosen_id_.reset();
-    if (decision.chosen >= 0) last_chosen_id_ = decision.candidates[static_cast<std::size_t>(decision.chosen)].view.id;
-    return decision;
-  }
-
-  void Report(const Attempt& attempt) final {
-    if (!(attempt.t_plan_s >= 0.0) || !(attempt.t_learn_s >= 0.0) || !std::isfinite(attempt.t_plan_s + attempt.t_learn_s)) {
-      throw std::invalid_argument("an attempt's t_plan_s and t_learn_s must be >= 0 and finite");
-    }
-    ++attempts_;
-    failures_.Note(attempt);
-    t_plan_s_.Add(attempt.t_plan_s);
-    t_learn_s_.Add(attempt.t_learn_s);
-    if (last_chosen_id_) tried_ids_.insert(*last_chosen_id_);
-  }
-
- protected:
-  // Sets chosen, or stop, and says in every candidate that was not considered why.
-  virtual void Choose(Decision& decision, const geometry::Rigid& T_world_camera, const motion::Mount& mount) const = 0;
-
-  // Worth of the trip before its cost, seconds.
-  double ExpectedWorth(const Candidate& candidate) const { return params_.worth_s * candidate.detect_probability * candidate.gain; }
-
-  // Plans the paths to these candidates, together, and completes their costs and utilities.
-  void PlanPaths(const std::vector<Candidate*>& candidates, const geometry::Rigid& T_world_camera,
-                 const motion::Mount& mount) const {
-    std::vector<geometry::Rigid> goals;
-    for (const Candidate* candidate : candidates) goals.push_back(candidate->view.T_world_camera);
-    std::vector<motion::PathResult> paths = mount.Plan(T_world_camera, goals, DecisionSeed());
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      Candidate& candidate = *candidates[i];
-      candidate.refusal = paths[i].refusal;
-      candidate.path = std::move(paths[i].trajectory);
-      if (!candidate.path) continue;
-      candidate.t_move_s = candidate.path->duration_s();
-      candidate.utility_s = ExpectedWorth(candidate) - (candidate.t_plan_s + candidate.t_move_s + candidate.t_learn_s);
-    }
-  }
-
-  bool WasTried(const Candidate& candidate) const { return tried_ids_.count(candidate.view.id) > 0; }
-
-  // Another one after every attempt; the same decision asked for twice is the same decision.
-  std::uint32_t DecisionSeed() const { return seed_ + 0x9E3779B9u * static_cast<std::uint32_t>(attempts_); }
-
-  const PlannerParams params_;
-
- private:
-  StopReason StopWhateverThereIs(double completeness, double elapsed_s) const {
-    if (completeness >= params_.target_completeness) return StopReason::kTargetReached;
-    if (elapsed_s >= params_.time_budget_s) return StopReason::kTimeBudget;
-    if (attempts_ >= params_.max_attempts) return StopReason::kMaxAttempts;
-    return StopReason::kNone;
-  }
-
-  std::uint32_t seed_;
-  FailureMemory failures_;
-  RunningMean t_plan_s_, t_learn_s_;
-  int attempts_ = 0;
-  std::optional<int> last_chosen_id_;
-  std::set<int> tried_ids_;
-};
 
 // The greatest utility (section V-C).
 class UtilityStrategy : public SharedStrategy {
@@ -108,7 +15,8 @@ class UtilityStrategy : public SharedStrategy {
   using SharedStrategy::SharedStrategy;
 
  protected:
-  void Choose(Decision& decision, const geometry::Rigid& T_world_camera, const motion::Mount& mount) const override {
+  void Choose(const Belief& /*belief*/, Decision& decision, const geometry::Rigid& T_world_camera,
+              const motion::Mount& mount) const override {
     std::vector<Candidate*> queue;  // Reachable and worth something, best first.
     bool any_pays = false;
     for (Candidate& candidate : decision.candidates) {
@@ -162,39 +70,69 @@ class UtilityStrategy : public SharedStrategy {
   }
 };
 
-// Any reachable candidate that was not tried yet, uniformly: the baseline.
-class RandomStrategy : public SharedStrategy {
+// The planner, told the truth: what each view would bring.
+class OracleStrategy : public UtilityStrategy {
  public:
-  using SharedStrategy::SharedStrategy;
+  OracleStrategy(const PlannerParams& params, std::uint32_t seed, const OutcomeTable& outcomes)
+      : UtilityStrategy(params, seed), outcomes_(outcomes) {}
 
  protected:
-  void Choose(Decision& decision, const geometry::Rigid& T_world_camera, const motion::Mount& mount) const override {
-    std::vector<Candidate*> urn;
-    for (Candidate& candidate : decision.candidates) {
-      candidate.refusal = WasTried(candidate) ? "already tried" : mount.WhyUnreachable(candidate.view.T_world_camera);
-      if (candidate.refusal.empty()) urn.push_back(&candidate);
+  void Score(const Belief& belief, const GainScorer& /*scorer*/, std::vector<Candidate>& candidates) const override {
+    const std::size_t count = outcomes_.viewpoints.size();
+    std::vector<char> covered(count, 0);
+    for (const measures::Viewpoint& view : belief.views) {
+      const std::size_t learned = outcomes_.Nearest(view);
+      for (std::size_t i = 0; i < count; ++i) covered[i] |= outcomes_.detected[learned * count + i];
     }
-    std::mt19937 generator(DecisionSeed());
-    while (!urn.empty()) {
-      const std::size_t drawn = generator() % urn.size();
-      PlanPaths({urn[drawn]}, T_world_camera, mount);
-      if (urn[drawn]->path) {
-        decision.chosen = static_cast<int>(urn[drawn] - decision.candidates.data());
-        return;
-      }
-      urn.erase(urn.begin() + static_cast<std::ptrdiff_t>(drawn));
+    for (Candidate& candidate : candidates) {
+      const std::size_t here = outcomes_.Nearest(candidate.view.viewpoint);
+      std::size_t won = 0;
+      for (std::size_t i = 0; i < count; ++i) won += outcomes_.Detected(here, i) && !covered[i];
+      candidate.gain = static_cast<double>(won) / static_cast<double>(count);
+      candidate.detect_probability = FailureFactor(candidate.view.viewpoint) * (covered[here] != 0 ? 1.0 : 0.0);
     }
-    decision.stop = StopReason::kNothingReachable;
   }
+
+ private:
+  const OutcomeTable& outcomes_;
 };
 
 }  // namespace
 
-std::unique_ptr<Strategy> MakeStrategy(const std::string& name, const PlannerParams& params, std::uint32_t seed) {
+std::size_t OutcomeTable::Nearest(const measures::Viewpoint& viewpoint) const {
+  if (viewpoints.empty()) throw std::logic_error("an outcome table without viewpoints has no nearest one");
+  const auto nearest =
+      std::max_element(viewpoints.begin(), viewpoints.end(), [&](const measures::Viewpoint& a, const measures::Viewpoint& b) {
+        return a.direction.dot(viewpoint.direction) < b.direction.dot(viewpoint.direction);
+      });
+  return static_cast<std::size_t>(nearest - viewpoints.begin());
+}
+
+void OutcomeTable::Check() const {
+  if (viewpoints.empty() || detected.size() != viewpoints.size() * viewpoints.size()) {
+    throw std::invalid_argument("an outcome table needs viewpoints and an outcome for each pair of them, has " +
+                                std::to_string(viewpoints.size()) + " and " + std::to_string(detected.size()));
+  }
+}
+
+const std::vector<std::string>& StrategyNames() {
+  static const std::vector<std::string> names{"planner", "random", "nearest", "sweep", "coverage", "oracle"};
+  return names;
+}
+
+std::unique_ptr<Strategy> MakeStrategy(const std::string& name, const PlannerParams& params, std::uint32_t seed,
+                                       const OutcomeTable* outcomes) {
   params.Check();
   if (name == "planner") return std::make_unique<UtilityStrategy>(params, seed);
-  if (name == "random") return std::make_unique<RandomStrategy>(params, seed);
-  throw std::invalid_argument("the strategy must be planner or random, is \"" + name + "\"");
+  if (name == "oracle") {
+    if (outcomes == nullptr) throw std::invalid_argument("the strategy oracle needs a table of outcomes");
+    outcomes->Check();
+    return std::make_unique<OracleStrategy>(params, seed, *outcomes);
+  }
+  if (auto baseline = MakeBaseline(name, params, seed)) return baseline;
+  std::string known;
+  for (const std::string& each : StrategyNames()) known += (known.empty() ? "" : ", ") + each;
+  throw std::invalid_argument("the strategy must be one of " + known + ", is \"" + name + "\"");
 }
 
 }  // namespace vantage::exploration

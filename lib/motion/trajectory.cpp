@@ -219,14 +219,17 @@ void SpeedLimits::Check() const {
   CheckPositive(max_turn_acceleration_rad_s2, "max_turn_acceleration_rad_s2");
 }
 
-Rigid Trajectory::At(double time_s) const {
+Waypoint Trajectory::Sample(double time_s) const {
   if (waypoints.empty()) throw std::logic_error("a trajectory without waypoints has no pose");
   const auto after = std::lower_bound(waypoints.begin(), waypoints.end(), time_s,
                                       [](const Waypoint& waypoint, double time) { return waypoint.time_s < time; });
-  if (after == waypoints.begin()) return waypoints.front().T_world_mount;
-  if (after == waypoints.end()) return waypoints.back().T_world_mount;
+  if (after == waypoints.begin()) return waypoints.front();
+  if (after == waypoints.end()) return waypoints.back();
   const Waypoint& before = *(after - 1);
-  return Interpolate(before.T_world_mount, after->T_world_mount, (time_s - before.time_s) / (after->time_s - before.time_s));
+  const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
+  Waypoint sample{time_s, Interpolate(before.T_world_mount, after->T_world_mount, share)};
+  if (before.joints_rad.size() > 0) sample.joints_rad = (1.0 - share) * before.joints_rad + share * after->joints_rad;
+  return sample;
 }
 
 Trajectory TimePath(const std::vector<Rigid>& poses, const SpeedLimits& limits, double corner_cut_m) {
@@ -237,7 +240,7 @@ Trajectory TimePath(const std::vector<Rigid>& poses, const SpeedLimits& limits, 
     if (!pose.matrix().allFinite()) throw std::invalid_argument("a pose of the path is not finite");
   }
   const std::vector<Segment> segments = MakeSegments(poses, limits);
-  if (segments.empty()) return Trajectory{{{0.0, poses.front()}}};
+  if (segments.empty()) return Trajectory{{Waypoint{0.0, poses.front()}}};
   const std::vector<Piece> pieces = MakePieces(segments, limits, corner_cut_m);
   const std::vector<Cell> cells = MakeCells(pieces);
   return Sample(pieces, cells, SquaredRates(pieces, cells, limits));

@@ -19,14 +19,16 @@ struct SpeedLimits {
 struct Waypoint {
   double time_s = 0.0;  // Since the start; ascending.
   geometry::Rigid T_world_mount = geometry::Rigid::Identity();
+  Eigen::VectorXd joints_rad = {};  // Of an arm, from its base; empty for a mount without joints.
 };
 
 struct Trajectory {
   std::vector<Waypoint> waypoints;
 
   double duration_s() const { return waypoints.empty() ? 0.0 : waypoints.back().time_s; }
-  // The pose at a time; clamped to the ends. Throws std::logic_error where there are no waypoints.
-  geometry::Rigid At(double time_s) const;
+  // The waypoint at a time, the pose at a time; clamped to the ends. Throw std::logic_error where there are no waypoints.
+  Waypoint Sample(double time_s) const;
+  geometry::Rigid At(double time_s) const { return Sample(time_s).T_world_mount; }
 };
 
 // Times a polyline of poses: the mount starts and ends at rest and keeps all four limits along the whole path, translation and

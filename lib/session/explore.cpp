@@ -23,7 +23,7 @@ class Run {
         store_(store),
         progress_(progress),
         learner_(params.learner, start.object_name),
-        strategy_(exploration::MakeStrategy(params.strategy, params.planner, params.seed)) {}
+        strategy_(exploration::MakeStrategy(params.strategy, params.planner, params.seed, params.outcomes)) {}
 
   ExploreResult Go() {
     result_.strategy = params_.strategy;
@@ -67,6 +67,7 @@ class Run {
 
   void Attempt(const exploration::Candidate& chosen, const exploration::Decision& decision) {
     ++result_.attempts;
+    Audit(*chosen.path);
     const rgbd::Frame frame = world_.Look(chosen.view.T_world_camera, params_.seed + 1000u * result_.attempts);
     pose_ = *frame.T_world_camera;
     const learning::LearnerResult learned = learner_.Process(frame);
@@ -86,6 +87,24 @@ class Run {
     Tell(learned.view_added ? "view added" : learned.note, &decision);
   }
 
+  void Audit(const motion::Trajectory& path) {
+    motion::Obstacles all = obstacles_;
+    for (const simulation::TrueObject& object : world_.Truth()) {
+      if (object.points.cols() == 0) continue;
+      motion::HullObstacle hull{object.name, {}};
+      for (Eigen::Index i = 0; i < object.points.cols(); ++i) {
+        hull.points_in_world.push_back(object.T_world_object * Eigen::Vector3d(object.points.col(i)));
+      }
+      all.hulls.push_back(std::move(hull));
+    }
+    const motion::PathAudit audit = motion::AuditPath(path, motion::CameraBall(params_.mount.camera_radius_m), all);
+    ++result_.audit.paths;
+    result_.audit.touching += audit.touches();
+    if (audit.clearance_m >= result_.audit.clearance_m) return;
+    result_.audit.clearance_m = audit.clearance_m;
+    result_.audit.obstacle = audit.obstacle;
+  }
+
   // After every new view: durable, assessed, judged.
   void LearnedView(const rgbd::Frame& frame) {
     const auto object = learner_.object();
@@ -101,7 +120,10 @@ class Run {
     result_.completeness = CompletenessNow();
     if (store_) store_->SaveMeasures(object->name, learner_.object()->measures, result_.completeness);
     result_.completeness_over_time.emplace_back(result_.time.total_s(), result_.completeness);
-    if (judge_ && params_.judge_over_time) result_.true_rate_over_time.emplace_back(result_.time.total_s(), TrueRate());
+    if (judge_ && params_.judge_over_time && newest % params_.judge_every_views == 0) {
+      result_.true_rate_over_time.emplace_back(result_.time.total_s(), TrueRate());
+      judged_views_ = newest + 1;
+    }
   }
 
   void AddBackground(const rgbd::Frame& frame) {
@@ -158,7 +180,8 @@ class Run {
     result_.views = static_cast<int>(result_.object->views.size());
     result_.completeness = CompletenessNow();
     if (!judge_) return;
-    result_.true_detection_rate = result_.true_rate_over_time.empty() ? TrueRate() : result_.true_rate_over_time.back().second;
+    const bool judged = judged_views_ == result_.views;
+    result_.true_detection_rate = judged ? result_.true_rate_over_time.back().second : TrueRate();
   }
 
   void Tell(const std::string& note, const exploration::Decision* decision) const {
@@ -182,6 +205,7 @@ class Run {
   std::vector<assessment::Trial> trials_;
   std::vector<exploration::CandidateView> candidates_;
   std::vector<measures::WeightedViewpoint> reachable_;
+  int judged_views_ = 0;  // How many views the model had when it was judged last.
   ExploreResult result_;
 };
 
@@ -193,9 +217,11 @@ void ExploreParams::Check() const {
   candidates.Check();
   mount.Check();
   trials.Check();
-  if (strategy != "planner" && strategy != "random") {
-    throw std::invalid_argument("explore: strategy must be \"planner\" or \"random\", is \"" + strategy + "\"");
+  const auto& names = exploration::StrategyNames();
+  if (std::find(names.begin(), names.end(), strategy) == names.end()) {
+    throw std::invalid_argument("explore: strategy is unknown: \"" + strategy + "\"");
   }
+  if (judge_every_views < 1) throw std::invalid_argument("explore: judge_every_views must be >= 1");
   if (max_backgrounds < 0) throw std::invalid_argument("explore: max_backgrounds must be >= 0");
 }
 

@@ -13,6 +13,7 @@
 #include "learning/learner.h"
 #include "model/store.h"
 #include "motion/mount.h"
+#include "motion/path_audit.h"
 #include "session/judge.h"
 #include "simulation/world.h"
 
@@ -24,9 +25,12 @@ struct ExploreParams {
   exploration::CandidateParams candidates;  // Where any pose can be taken; a recorded world has its own.
   motion::FreeMountParams mount;
   assessment::TrialParams trials;
-  std::string strategy = "planner";  // "planner" or "random".
-  int max_backgrounds = 8;           // Own frames, objects masked, that virtual views are pasted over; >= 0.
-  bool judge_over_time = true;       // Judge the model after every added view, not only the last.
+  std::string strategy = "planner";  // A name of exploration::StrategyNames().
+  // What the strategy "oracle" knows; null for the others. Must outlive the run.
+  const exploration::OutcomeTable* outcomes = nullptr;
+  int max_backgrounds = 8;      // Own frames, objects masked, that virtual views are pasted over; >= 0.
+  bool judge_over_time = true;  // Judge the model on the way, not only at the end...
+  int judge_every_views = 1;    // ...after every so many views; >= 1.
   std::uint32_t seed = 0;
 
   void Check() const;  // Throws std::invalid_argument naming the field.
@@ -37,6 +41,15 @@ struct ExploreTime {
   double move_s = 0.0;
   double learn_s = 0.0;
   double total_s() const { return plan_s + move_s + learn_s; }
+};
+
+// What the second opinion (motion/path_audit.h) says of all paths that were executed, against what is truly there: furniture, the
+// hulls of all objects, and the obstacles the planner knew of.
+struct ExploreAudit {
+  int paths = 0;
+  int touching = 0;
+  double clearance_m = motion::kFarAudit_m;  // The least of all.
+  std::string obstacle;                      // To what.
 };
 
 struct ExploreResult {
@@ -51,6 +64,7 @@ struct ExploreResult {
   std::vector<std::pair<double, double>> true_rate_over_time;     // Likewise; empty where not judged.
   std::optional<double> true_detection_rate;
   std::string stop_reason;
+  ExploreAudit audit;
   std::shared_ptr<const model::ObjectModel> object;  // Null where no object was found at the start.
 };
 

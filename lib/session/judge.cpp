@@ -34,13 +34,21 @@ bool Judge::Add(const rgbd::Frame& frame, const geometry::Rigid& T_camera_mesh) 
 
 double Judge::TrueDetectionRate(std::shared_ptr<const model::ObjectModel> object, const geometry::Rigid& T_mesh_object) const {
   if (views_.empty()) return 0.0;
+  const std::vector<char> right = Outcomes(std::move(object), T_mesh_object);
+  return std::accumulate(right.begin(), right.end(), 0.0) / size();
+}
+
+std::vector<char> Judge::Outcomes(std::shared_ptr<const model::ObjectModel> object, const geometry::Rigid& T_mesh_object,
+                                  const std::vector<char>& asked) const {
   recognition::Recogniser recogniser(recogniser_params_);
   recogniser.Set(object);
-  std::vector<int> right(views_.size(), 0);
+  std::vector<char> right(views_.size(), 0);
   cv::parallel_for_(cv::Range(0, size()), [&](const cv::Range& range) {
-    for (int i = range.start; i < range.end; ++i) right[i] = IsDetected(recogniser, views_[i], T_mesh_object);
+    for (int i = range.start; i < range.end; ++i) {
+      if (asked.empty() || asked[i] != 0) right[i] = IsDetected(recogniser, views_[i], T_mesh_object);
+    }
   });
-  return std::accumulate(right.begin(), right.end(), 0.0) / size();
+  return right;
 }
 
 bool Judge::IsDetected(const recognition::Recogniser& recogniser, const JudgeView& view,

@@ -27,10 +27,14 @@ class Judge {
   bool Add(const rgbd::Frame& frame, const geometry::Rigid& T_camera_mesh);
   int size() const { return static_cast<int>(views_.size()); }
   const std::vector<JudgeView>& views() const { return views_; }
+  const Eigen::Matrix3Xd& points_in_mesh() const { return points_in_mesh_; }
 
   // Share of the views in which the object is detected (p(o|c) >= 1/2) within 4 cm of the truth. `T_mesh_object` places the model's
   // frame.
   double TrueDetectionRate(std::shared_ptr<const model::ObjectModel> object, const geometry::Rigid& T_mesh_object) const;
+  // The same view by view: != 0 where it is detected. Views with 0 in `asked` (same order, or empty: all are) are not looked at.
+  std::vector<char> Outcomes(std::shared_ptr<const model::ObjectModel> object, const geometry::Rigid& T_mesh_object,
+                             const std::vector<char>& asked = {}) const;
 
  private:
   bool IsDetected(const recognition::Recogniser& recogniser, const JudgeView& view, const geometry::Rigid& T_mesh_object) const;

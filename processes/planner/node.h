@@ -17,7 +17,7 @@
 namespace vantage::planner {
 
 struct PlannerNodeParams {
-  std::string strategy = "planner";  // "planner" or "random".
+  std::string strategy = "planner";  // "planner", "random", "nearest", "sweep" or "coverage".
   std::uint32_t seed = 0;
   double wait_s = 90.0;           // Where there is still no object to explore after so long, the run ends; > 0.
   double measures_wait_s = 60.0;  // The first decision and a decision to stop wait at most so long for measures of all views; >= 0.

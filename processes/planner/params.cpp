@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <stdexcept>
 
 #include "common/params.h"
@@ -9,7 +10,9 @@ void PlannerNodeParams::Check() const {
   const auto require = [](bool ok, const char* what) {
     if (!ok) throw std::invalid_argument(what);
   };
-  require(strategy == "planner" || strategy == "random", "strategy must be planner or random");
+  const auto& names = exploration::StrategyNames();
+  const bool known = std::find(names.begin(), names.end(), strategy) != names.end();
+  require(known && strategy != "oracle", "strategy must be planner, random, nearest, sweep or coverage");
   require(wait_s > 0.0, "wait_s must be > 0");
   require(measures_wait_s >= 0.0, "measures_wait_s must be >= 0");
   require(max_unmeasured_views >= 0, "max_unmeasured_views must be >= 0");

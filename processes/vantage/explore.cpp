@@ -6,48 +6,10 @@
 #include <random>
 #include <sstream>
 
-#include "vantage/scenario.h"
-#include "vantage/verb.h"
+#include "vantage/explore_runs.h"
 
 namespace vantage::cli {
 namespace {
-
-struct ExploreOptions {
-  CommonOptions common;
-  std::string sequence;
-  int object_id = 0;  // 0 = not given.
-  std::string world;
-  std::vector<std::string> meshes;
-  std::string object;
-  std::string strategy = "planner";
-  int runs = 1;
-  int judge_views = 200;
-  bool judge_over_time = false;
-  std::string store;
-};
-
-Json ToJson(const std::vector<std::pair<double, double>>& curve) {
-  Json points = Json::array();
-  for (const auto& [time_s, value] : curve) points.push_back({time_s, value});
-  return points;
-}
-
-Json ToJson(const session::ExploreResult& run) {
-  Json entry;
-  entry["strategy"] = run.strategy;
-  entry["seed"] = run.seed;
-  entry["views"] = run.views;
-  entry["attempts"] = run.attempts;
-  entry["failed_attempts"] = run.failed_attempts;
-  entry["time_s"] = {
-      {"plan", run.time.plan_s}, {"move", run.time.move_s}, {"learn", run.time.learn_s}, {"total", run.time.total_s()}};
-  entry["completeness"] = Number(run.completeness);
-  entry["completeness_over_time"] = ToJson(run.completeness_over_time);
-  entry["true_rate_over_time"] = ToJson(run.true_rate_over_time);
-  entry["true_detection_rate"] = run.true_detection_rate ? Number(*run.true_detection_rate) : Json(nullptr);
-  entry["stop_reason"] = run.stop_reason;
-  return entry;
-}
 
 void CheckChoice(const ExploreOptions& options) {
   const int worlds = static_cast<int>(!options.sequence.empty()) + static_cast<int>(!options.world.empty());
@@ -60,40 +22,6 @@ void CheckChoice(const ExploreOptions& options) {
   if (!options.world.empty() && !options.meshes.empty()) throw std::runtime_error("--world names its own meshes; leave --mesh out");
 }
 
-session::ExploreParams ParamsOf(const ExploreOptions& options, const params::LibraryParams& params, const Scenario& scenario,
-                                std::uint32_t seed) {
-  session::ExploreParams explore;
-  explore.learner = params.learner;
-  explore.learner.recogniser = scenario.recogniser;
-  explore.planner = params.planner;
-  explore.candidates = params.candidates;
-  explore.mount = params.mount;
-  explore.trials = params.trials;
-  explore.strategy = options.strategy;
-  explore.judge_over_time = scenario.judge_over_time || options.judge_over_time;
-  explore.seed = seed;
-  return explore;
-}
-
-// One run. Where the object cannot be made out from a start, the next one is taken: which comes first is the seed's choice,
-// whatever the strategy.
-session::ExploreResult RunOnce(const Scenario& scenario, const session::ExploreParams& params, const std::string& suffix,
-                               model::Store* store, const std::function<void(const session::ExploreStep&)>& progress) {
-  std::mt19937 random(params.seed);
-  const std::size_t first = random() % scenario.starts.size();
-  for (std::size_t i = 0;; ++i) {
-    session::ExploreStart start = scenario.starts[(first + i) % scenario.starts.size()];
-    start.object_name += suffix;
-    try {
-      if (store != nullptr) store->Remove(start.object_name);
-      return session::Explore(*scenario.world, start, params, scenario.judge.get(), store, progress);
-    } catch (const std::runtime_error& error) {
-      const bool not_found = std::string(error.what()).rfind("no object was found", 0) == 0;
-      if (!not_found || i + 1 == scenario.starts.size()) throw;
-    }
-  }
-}
-
 void TellStep(const session::ExploreStep& step) {
   std::ostringstream line;
   line.precision(3);
@@ -102,17 +30,8 @@ void TellStep(const session::ExploreStep& step) {
   std::cout << line.str() << std::flush;
 }
 
-std::string SummaryOf(const session::ExploreResult& run) {
-  std::ostringstream line;
-  line.precision(3);
-  line << run.strategy << ", seed " << run.seed << ": " << run.views << " views in " << run.attempts << " attempts, "
-       << run.time.total_s() << " s; completeness " << run.completeness;
-  if (run.true_detection_rate) line << ", true detection rate " << *run.true_detection_rate;
-  line << "; stopped: " << run.stop_reason << '\n';
-  return line.str();
-}
-
 void RunExplore(const ExploreOptions& options) {
+  if (!options.compare.empty()) return Compare(options);
   CheckChoice(options);
   CheckOutput(options.common);
   const params::LibraryParams params = LoadParams(options.common);
@@ -160,8 +79,17 @@ void AddExplore(CLI::App& app, Run& run) {
   verb->add_option("--object", options->object, "Name of the object of the world to explore (default: the first)")
       ->type_name("NAME");
   verb->add_option("--strategy", options->strategy, "How the next view is chosen")
-      ->check(CLI::IsMember({"planner", "random"}))
+      ->check(CLI::IsMember(exploration::StrategyNames()))
       ->capture_default_str();
+  verb->add_option("--compare", options->compare,
+                   "Compare strategies: every --mesh alone on a table, and the --sequence, are explored --runs times by each. Runs "
+                   "are kept in DIR and not made again; table.txt, compare.json and plots go there too")
+      ->type_name("DIR");
+  verb->add_option("--strategies", options->strategies, "The strategies to compare (default: all)")
+      ->check(CLI::IsMember(exploration::StrategyNames()))
+      ->delimiter(',')
+      ->type_name("NAMES");
+  verb->add_flag("--quick", options->quick, "Compare with few attempts, trials and judging views: to see that it works");
   verb->add_option("--runs", options->runs, "Number of runs, with seeds from --seed on")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();

@@ -18,6 +18,7 @@ constexpr int kSurfacePoints = 1000;
 constexpr double kVoxel = 0.005;           // Metres between surface points read off depth images.
 constexpr double kMinShareAtStart = 0.98;  // Of the object in the image.
 constexpr int kBorderPx = 20;
+constexpr int kStarts = 8;
 constexpr std::uint32_t kJudgeSeed = 0x5eed;  // Judging views are others than any a run takes.
 
 // --- Recordings ---
@@ -184,7 +185,7 @@ Scenario RecordedScenario(const std::string& folder, int object_id, const std::s
 }
 
 Scenario SimulatedScenario(const std::string& world_file, const std::vector<std::string>& mesh_files, const std::string& object,
-                           int judge_views, const params::LibraryParams& params, std::uint32_t seed) {
+                           int judge_views, const params::LibraryParams& params, std::uint32_t seed, bool several_starts) {
   const simulation::WorldParams world_params =
       world_file.empty() ? WorldOfMeshes(mesh_files) : simulation::LoadWorldParams(world_file);
   const auto world = std::make_shared<const simulation::SimulatedWorld>(world_params);
@@ -206,12 +207,17 @@ Scenario SimulatedScenario(const std::string& world_file, const std::vector<std:
     throw std::runtime_error((world_file.empty() ? std::string("--mesh") : world_file) + ": no pose around '" + placed.truth.name +
                              "' can be reached; check mount and candidates in --config");
   }
-  session::ExploreStart start;
-  start.T_world_camera = world->StartPose();
-  start.target.pixel = world->Camera().Project(start.T_world_camera.inverse() * placed.centre_in_world);
-  start.object_name = placed.truth.name;
-  start.T_world_mesh = placed.truth.T_world_object;
-  scenario.starts.push_back(start);
+  const int starts = several_starts ? kStarts : 1;
+  for (int i = 0; i < starts; ++i) {
+    const Eigen::AngleAxisd turn(2.0 * M_PI * i / starts, Eigen::Vector3d::UnitZ());
+    session::ExploreStart start;
+    start.T_world_camera =
+        Eigen::Translation3d(placed.centre_in_world) * turn * Eigen::Translation3d(-placed.centre_in_world) * world->StartPose();
+    start.target.pixel = world->Camera().Project(start.T_world_camera.inverse() * placed.centre_in_world);
+    start.object_name = placed.truth.name;
+    start.T_world_mesh = placed.truth.T_world_object;
+    if (i == 0 || mount->WhyUnreachable(start.T_world_camera).empty()) scenario.starts.push_back(start);
+  }
   return scenario;
 }
 

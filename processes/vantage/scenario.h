@@ -27,9 +27,10 @@ Scenario RecordedScenario(const std::string& folder, int object_id, const std::s
                           const params::LibraryParams& params);
 
 // `world_file` is a world's YAML; where it is empty, a table with `mesh_files` on it, the first in the middle. `object` names the
-// one to explore; empty = the first. Judged by `judge_views` random views of the reachable part of its view sphere.
-// Throws std::runtime_error where a file cannot be read or there is no such object.
+// one to explore; empty = the first. Judged by `judge_views` random views of the reachable part of its view sphere. Runs begin at
+// the world's start pose; with `several_starts` at that and seven more, turned about the object. Throws std::runtime_error where a
+// file cannot be read or there is no such object.
 Scenario SimulatedScenario(const std::string& world_file, const std::vector<std::string>& mesh_files, const std::string& object,
-                           int judge_views, const params::LibraryParams& params, std::uint32_t seed);
+                           int judge_views, const params::LibraryParams& params, std::uint32_t seed, bool several_starts = false);
 
 }  // namespace vantage::cli

@@ -160,7 +160,7 @@ TEST(Planner, PlansFurtherPathsWhereTheBestAreRefused) {
 TEST(Planner, DecidesTheSameEveryTime) {
   const auto ring = Ring(3.0);
   const Belief belief = BeliefFrom({ring[0]}, ring);
-  for (const char* name : {"planner", "random"}) {
+  for (const char* name : {"planner", "random", "nearest", "sweep", "coverage"}) {
     const Decision a = MakeStrategy(name, {}, 5)->Decide(belief, ring, ring[0].T_world_camera, TestMount(), 0.0);
     const Decision b = MakeStrategy(name, {}, 5)->Decide(belief, ring, ring[0].T_world_camera, TestMount(), 0.0);
     EXPECT_EQ(a.chosen, b.chosen);
@@ -211,7 +211,7 @@ TEST_P(StopTest, WithoutCandidates) {
   EXPECT_EQ(strategy->Decide(belief, {}, ring[0].T_world_camera, mount, 0.0).stop, StopReason::kNothingReachable);
 }
 
-INSTANTIATE_TEST_SUITE_P(Both, StopTest, testing::Values("planner", "random"),
+INSTANTIATE_TEST_SUITE_P(All, StopTest, testing::Values("planner", "random", "nearest", "sweep", "coverage"),
                          [](const auto& one) { return std::string(one.param); });
 
 using PlannerStops = StopTest;
