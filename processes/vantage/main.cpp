@@ -55,6 +55,8 @@ int main(int argc, char** argv) {
   vantage::cli::AddVocabulary(app, run);
   vantage::cli::AddLog(app, run);
   vantage::cli::AddReplay(app, run);
+  vantage::cli::AddCalibrate(app, run);
+  vantage::cli::AddTruth(app, run);
   if (const std::string word = UnknownVerb(app, argc, argv); !word.empty()) {
     return Fail("vantage", "there is no verb '" + word + "'; see vantage --help");
   }

@@ -39,6 +39,8 @@ void AddEvaluateFeatures(CLI::App& evaluate, Run& run);
 void AddEvaluateLearner(CLI::App& evaluate, Run& run);
 void AddEvaluateRecogniser(CLI::App& evaluate, Run& run);
 void AddEvaluateSegmentation(CLI::App& evaluate, Run& run);
+void AddCalibrate(CLI::App& app, Run& run);
+void AddTruth(CLI::App& app, Run& run);
 void AddVocabulary(CLI::App& app, Run& run);
 void AddLog(CLI::App& app, Run& run);
 void AddReplay(CLI::App& app, Run& run);
