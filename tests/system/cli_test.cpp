@@ -100,6 +100,7 @@ TEST_F(Cli, HelpAndVersionOfEveryVerb) {
                            "recognise",
                            "assess",
                            "explore",
+                           "calibrate",
                            "evaluate calibration",
                            "evaluate features",
                            "evaluate learner",
@@ -113,6 +114,7 @@ TEST_F(Cli, HelpAndVersionOfEveryVerb) {
                            "models list",
                            "models show",
                            "replay",
+                           "truth",
                            "vocabulary train",
                            "vocabulary show"}) {
     SCOPED_TRACE(verb);
