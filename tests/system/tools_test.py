@@ -110,6 +110,51 @@ def test_spy(folder):
             process.wait(20)
 
 
+def colours(rows, left, right):
+    """How many different colours, of 16 grades a channel, and how many pixels that are no grey."""
+    seen, vivid = set(), 0
+    for row in rows:
+        for x in range(left, right):
+            blue, green, red = row[4 * x:4 * x + 3]
+            seen.add((blue >> 4, green >> 4, red >> 4))
+            vivid += max(blue, green, red) - min(blue, green, red) > 80
+    return len(seen), vivid
+
+
+def test_view(folder):
+    """scripts/spy --view shows colour, depth and, once something was learned, the view sphere."""
+    os.environ["DISPLAY"] = ":78"
+    os.environ["VANTAGE_SPY_FOLDER"] = str(folder / "types")
+    os.environ["VANTAGE_OWN_NETWORK"] = "1"
+    picture = folder / "Xvfb_screen0"
+    library = folder / "library.yaml"
+    text = (ROOT / "config" / "library.yaml").read_text()
+    for key, value in (("trials_per_view", 6), ("negatives_per_view", 2)):
+        text = re.sub(rf"^  {key}: \S+", f"  {key}: {value}", text, flags=re.MULTILINE)
+    library.write_text(text)
+    launch = [ROOT / "scripts" / "launch"]
+    running = []
+    try:
+        running.append(subprocess.Popen(["Xvfb", ":78", "-screen", "0", "1020x710x24", "-fbdir", folder, "-nolisten", "tcp"],
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        wait_for(picture.is_file, "the display")
+        running.append(subprocess.Popen([ROOT / "scripts" / "spy", "--view"], stdout=subprocess.DEVNULL))
+        subprocess.run([*launch, "up", "explore", "--library", library, "--dir", folder / "run"], check=True)
+        # The window is at the lower edge: three panels beside each other.
+        rows = lambda: read_xwd(picture)[2][380:620]
+        wait_for(lambda: colours(rows(), 10, 320)[0] > 150, "a colour image")
+        wait_for(lambda: colours(rows(), 350, 640)[1] > 20000, "a depth image in colours")
+        wait_for(lambda: colours(rows(), 680, 990)[1] > 20000, "a view sphere", 150.0)
+    finally:
+        save = os.environ.get("VANTAGE_SAVE")
+        if save and picture.is_file():
+            Path(save).write_bytes(picture.read_bytes())
+        subprocess.run([*launch, "down", "explore", "--dir", folder / "run"], check=False)
+        for process in reversed(running):
+            process.terminate()
+            process.wait(20)
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="vantage-") as folder:
         globals()[f"test_{sys.argv[1]}"](Path(folder))
