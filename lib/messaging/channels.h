@@ -21,6 +21,10 @@ inline constexpr char kPlannerPlan[] = "PLANNER_PLAN";                    // pla
 inline constexpr char kPlannerReach[] = "PLANNER_REACH";                  // reach_t
 inline constexpr char kOperatorCommand[] = "OPERATOR_COMMAND";            // operator_command_t
 inline constexpr char kObjectPrior[] = "OBJECT_PRIOR";                    // object_prior_t
+inline constexpr char kLinkClock[] = "LINK_CLOCK";                        // host_clock_t
+inline constexpr char kLinkQuery[] = "LINK_QUERY";                        // store_query_t
+inline constexpr char kLinkList[] = "LINK_LIST";                          // store_list_t
+inline constexpr char kLinkPart[] = "LINK_PART";                          // store_part_t
 
 // The status channel of a process: "learner" -> "LEARNER_STATUS" (status_t).
 std::string StatusChannel(const std::string& process);

@@ -2,10 +2,13 @@
 
 #include <map>
 #include <vantage/answer_t.hpp>
+#include <vantage/host_clock_t.hpp>
 #include <vantage/object_prior_t.hpp>
 #include <vantage/operator_command_t.hpp>
 #include <vantage/query_t.hpp>
 #include <vantage/status_t.hpp>
+#include <vantage/store_list_t.hpp>
+#include <vantage/store_query_t.hpp>
 
 #include "messaging/assessor_messages.h"
 #include "messaging/channels.h"
@@ -14,6 +17,7 @@
 #include "messaging/learner_messages.h"
 #include "messaging/mount_messages.h"
 #include "messaging/planner_messages.h"
+#include "messaging/store_messages.h"
 
 namespace vantage::messaging {
 namespace {
@@ -26,6 +30,10 @@ std::string WhyWrong(const query_t& query) { return FromMessage(query.T_frame_ca
 std::string WhyWrong(const answer_t& answer) { return IsProbability(answer.probability) ? "" : "a probability out of range"; }
 std::string WhyWrong(const status_t&) { return ""; }
 std::string WhyWrong(const operator_command_t&) { return ""; }
+std::string WhyWrong(const host_clock_t& clock) { return clock.host.empty() ? "a clock of no host" : ""; }
+std::string WhyWrong(const store_query_t&) { return ""; }
+std::string WhyWrong(const store_list_t&) { return ""; }
+std::string WhyWrong(const store_part_t& part) { return WhyNotAPart(part); }
 std::string WhyWrong(const plan_t& plan) { return IsProbability(plan.completeness) ? "" : "a completeness out of range"; }
 template <typename Message>
 std::string WhyWrong(const Message& message) {
@@ -60,8 +68,9 @@ KnownTypes MakeKnownTypes() {
 
 const KnownType* Find(const void* data, std::size_t size) {
   static const KnownTypes types =
-      MakeKnownTypes<answer_t, completeness_t, detections_t, image_part_t, measures_t, mount_command_t, mount_state_t,
-                     object_prior_t, operator_command_t, plan_t, query_t, reach_t, scene_t, status_t, track_t, view_t>();
+      MakeKnownTypes<answer_t, completeness_t, detections_t, host_clock_t, image_part_t, measures_t, mount_command_t, mount_state_t,
+                     object_prior_t, operator_command_t, plan_t, query_t, reach_t, scene_t, status_t, store_list_t, store_part_t,
+                     store_query_t, track_t, view_t>();
   if (size < 16) return nullptr;  // Fingerprint and utime.
   std::int64_t fingerprint = 0;
   __int64_t_decode_array(data, 0, 8, &fingerprint, 1);
@@ -96,7 +105,11 @@ std::string TypeOfChannel(const std::string& channel) {
                                                            {kPlannerPlan, "plan_t"},
                                                            {kPlannerReach, "reach_t"},
                                                            {kOperatorCommand, "operator_command_t"},
-                                                           {kObjectPrior, "object_prior_t"}};
+                                                           {kObjectPrior, "object_prior_t"},
+                                                           {kLinkClock, "host_clock_t"},
+                                                           {kLinkQuery, "store_query_t"},
+                                                           {kLinkList, "store_list_t"},
+                                                           {kLinkPart, "store_part_t"}};
   const auto known = types.find(channel);
   if (known != types.end()) return known->second;
   return EndsWith(channel, "_STATUS") ? "status_t" : "";

@@ -99,7 +99,10 @@ std::vector<std::string> LogSummary::Problems() const {
                        " bytes passed over, the first at byte " + std::to_string(damage.first_offset) +
                        (damage.cut_off ? "; the log is cut off at its end" : ""));
   }
-  if (late_events > 0) problems.push_back(Times(late_events, "event", "events") + " out of the order of time");
+  if (most_late_us > kLoggerDisorder_us) {
+    problems.push_back(Times(late_events, "event", "events") + " out of the order of time, by " +
+                       std::to_string(most_late_us / 1000) + " ms at most");
+  }
   for (const auto& [name, channel] : channels) {
     if (channel.refused > 0) {
       problems.push_back(name + ": " + Times(channel.refused, "message", "messages") +
@@ -119,7 +122,10 @@ LogSummary Summarise(LogReader& log) {
   std::map<std::string, Followed> followed;
   while (const auto event = log.Next()) {
     if (summary.events == 0) summary.first_us = event->time_us;
-    if (summary.events > 0 && event->time_us < summary.last_us) ++summary.late_events;
+    if (summary.events > 0 && event->time_us < summary.last_us) {
+      ++summary.late_events;
+      summary.most_late_us = std::max(summary.most_late_us, summary.last_us - event->time_us);
+    }
     summary.last_us = std::max(summary.last_us, event->time_us);
     ++summary.events;
     Count(*event, summary.channels[event->channel], followed[event->channel]);

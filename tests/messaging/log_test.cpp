@@ -189,6 +189,17 @@ TEST(LogSummary, AGoodLogHasNoProblems) {
   EXPECT_EQ(summary.channels.at("OTHERS").type, "unknown");
 }
 
+TEST(LogSummary, LcmLoggersOwnDisorderIsNoProblem) {
+  Log log;
+  log.Write("OTHERS", {1});
+  log.time_us -= 140000;  // 40 ms late, as around messages in fragments.
+  log.Write("OTHERS", {1});
+  const auto summary = log.Summary();
+  EXPECT_EQ(summary.late_events, 1);
+  EXPECT_EQ(summary.most_late_us, 40000);
+  EXPECT_TRUE(summary.Problems().empty());
+}
+
 TEST(LogSummary, SaysWhatIsWrong) {
   Log log;
   log.Write(kSensorColor, Part(3, 1, 2));  // Was under way when the log began.
@@ -212,14 +223,17 @@ TEST(LogSummary, SaysWhatIsWrong) {
     command.utime = -1;
     return Bytes(command);
   }());
-  log.time_us = 0;
+  log.time_us -= 140000;
+  log.Write("OTHERS", {});
+  log.time_us -= 800000;
   log.Write("OTHERS", {});
   const auto summary = log.Summary();
   EXPECT_EQ(summary.channels.at(kSensorColor).lost_images, 3);
   EXPECT_EQ(summary.channels.at(kObjectPrior).refused, 4);
   EXPECT_EQ(summary.channels.at(kObjectPrior).type, "several");
   EXPECT_EQ(summary.channels.at(kOperatorCommand).backwards, 1);
-  EXPECT_EQ(summary.late_events, 1);
+  EXPECT_EQ(summary.late_events, 2);
+  EXPECT_GT(summary.most_late_us, 500000);
   EXPECT_EQ(summary.Problems().size(), 4u);
 }
 
