@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "assessment/background.h"
 #include "measures/completeness.h"
 #include "model/object_model.h"
 #include "recognition/recogniser.h"
@@ -18,9 +19,11 @@ struct TrialParams {
   double max_rotation_deg = 60.0;  // Out of plane, uniform in 0..max; (0, 90].
   double min_elevation_deg = 0.0;  // No camera is lower (object z up): below is the table; [-90, 90).
   double max_scale_octaves = 1.0;  // Distances +-max about the views' median, mostly near it: 1 = 0.5..2 times; >= 0.
-  double max_image_noise = 16.0;   // Sigma, grey levels: 8 even levels from 0, each half as often as the last; >= 0.
+  double max_image_noise = 16.0;   // Sigma, grey levels: 8 even levels from 0; >= 0.
   double max_blur_px = 1.6;        // Sigma, likewise; >= 0.
+  double level_ratio = 0.5;        // Every level is so much rarer than the one below; (0, 1], 1 = all alike.
   double max_brightness = 0.25;    // Relative change of brightness, and of gamma; [0, 1).
+  double max_occlusion = 0.0;      // Something hides up to this share of the object's box; [0, 1).
   double correct_m = 0.04;         // Mean point distance below which a detection is right; > 0.
   int image_width = 320;           // Virtual images are crops around the object, as tight as they can be but
   int image_height = 240;          // never larger than twice this, close objects included; >= 64.
@@ -34,6 +37,13 @@ struct TrialParams {
 struct Proposal {
   double confidence = 0.0;  // (2)
   bool correct = false;     // Within correct_m of the truth.
+  double error_m = 0.0;     // Mean point distance from the truth; infinite where the object is not there.
+};
+
+// From where a view is tried.
+struct Displacement {
+  double rotation_rad = 0.0;  // Out of plane.
+  double log2_scale = 0.0;    // log2(learned distance / seen distance).
 };
 
 // One virtual image and what the recogniser made of it.
@@ -44,8 +54,9 @@ struct Trial {
   double log2_scale = 0.0;
   double image_noise = 0.0;
   double blur_px = 0.0;
-  std::vector<Proposal> alone;     // Of the view alone, the most likely first; none in a negative.
-  std::vector<Proposal> together;  // Likewise with all views up to this one on offer.
+  std::vector<Proposal> alone;       // Of the view alone, the most likely first; none in a negative.
+  std::vector<Proposal> together;    // Likewise with all views up to this one on offer.
+  std::vector<Displacement> others;  // Of the views on offer then besides this one; those less than 90 degrees off.
 
   // What the view alone led to.
   bool hypothesis() const { return !alone.empty(); }
@@ -53,18 +64,19 @@ struct Trial {
   double confidence() const { return hypothesis() ? alone.front().confidence : 0.0; }
 };
 
-// Trials for the views from `first_view` on. `backgrounds`: BGR images the object is pasted over (the run's own frames with the
-// objects masked, or photographs); plain grey noise where empty. Only as strong interest points count as the first background would
-// have kept. Negatives are whole backgrounds, each once: it is whole models and whole images that make wrong detections.
-// Deterministic in (model, params, backgrounds); a view's dice do not depend on first_view, but views learned later change what
-// earlier ones look like from aside. `progress` is called after every trial. Cost: about 90 ms of one core a trial, two thirds of
-// it interest points; and once those of every background.
-std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, const std::vector<cv::Mat>& backgrounds,
+// Trials for the views from `first_view` on. `backgrounds`: images the object is pasted over (the run's own frames with the objects
+// masked, or photographs); plain grey noise where empty; their features are found where they have none yet. Only as strong interest
+// points count as the first background would have kept. Negatives are whole backgrounds, each once: it is whole models and whole
+// images that make wrong detections. Deterministic in (model, params, backgrounds); a view's dice do not depend on first_view, but
+// views learned later change what earlier ones look like from aside. `progress` is called after every trial. Cost: about 90 ms of
+// one core a trial, two thirds of it interest points.
+std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, std::vector<Background>* backgrounds,
                              const recognition::RecogniserParams& recogniser, const TrialParams& params,
                              const std::function<void(int done, int of)>& progress = {});
 
 // Both measures from trials: p(o|c) from what was proposed with all views on offer, as the model is used; p(o|theta) from views
-// alone. A view counts as detected where its most likely proposal is right and has p(o|c) >= 1/2.
+// alone, and from views together how far they fail together. A view counts as detected where its most likely proposal is right and
+// has p(o|c) >= 1/2.
 measures::Measures FitMeasures(const std::vector<Trial>& trials, const recognition::RecogniserParams& recogniser,
                                measures::ObservedFit observed_fit = measures::ObservedFit::kGaussians);
 

@@ -1,7 +1,12 @@
 #include "assessment/background.h"
 
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
+#include <vector>
+
+#include "assessment/dice.h"
+#include "assessment/virtual_object.h"
 
 namespace vantage::assessment {
 
@@ -32,6 +37,28 @@ cv::Mat MaskedBackground(const cv::Mat& color, const cv::Mat& mask) {
       }
     }
   }
+  return result;
+}
+
+cv::Mat WithLookAlike(const cv::Mat& color, const model::ObjectModel& other, std::uint32_t seed) {
+  constexpr double kMaxRotationRad = M_PI / 6.0;
+  std::vector<int> shown;
+  for (std::size_t i = 0; i < other.views.size(); ++i) {
+    if (!other.views[i].keyframe.depth.empty() && !other.views[i].mask.empty()) shown.push_back(static_cast<int>(i));
+  }
+  if (shown.empty()) return color;
+  Dice dice({seed});
+  const model::ObjectModel one = other.OnlyView(shown[static_cast<std::size_t>(dice.Index(static_cast<int>(shown.size())))]);
+  VirtualPose pose;
+  pose.rotation_rad = dice.Uniform(0.0, kMaxRotationRad);
+  pose.tilt_rad = dice.Uniform(0.0, 2.0 * M_PI);
+  const geometry::Rigid T_camera_object = VirtualCameraPose(one.views.front(), pose);
+  const VirtualObject surface(one);
+  const VirtualImage image = surface.Render(surface.Window(0, T_camera_object, color.cols, color.rows), T_camera_object);
+  const cv::Rect place({dice.Index(color.cols - image.color.cols + 1), dice.Index(color.rows - image.color.rows + 1)},
+                       image.color.size());
+  cv::Mat result = color.clone();
+  Paste(image, result(place)).copyTo(result(place));
   return result;
 }
 

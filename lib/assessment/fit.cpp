@@ -17,13 +17,26 @@ measures::Measures FitMeasures(const std::vector<Trial>& trials, const recogniti
   measures.observed =
       measures::ObservedSuccess::Fit(proposals, measures::Source::kOwn, measures::ObservedSuccess::kPriorCount, observed_fit);
 
+  const auto is_detected = [&](const std::vector<Proposal>& proposed) {
+    return !proposed.empty() && proposed.front().correct && measures.observed.Probability(proposed.front().confidence) >= 0.5;
+  };
   std::vector<measures::PredictionSample> predictions;
   for (const Trial& trial : trials) {
-    if (!trial.object_shown) continue;
-    const bool detected = trial.correct() && measures.observed.Probability(trial.confidence()) >= 0.5;
-    predictions.push_back({trial.rotation_rad, trial.log2_scale, detected});
+    if (trial.object_shown) predictions.push_back({trial.rotation_rad, trial.log2_scale, is_detected(trial.alone)});
   }
   measures.predicted = measures::PredictedSuccess::Fit(predictions, measures::Source::kOwn);
+
+  std::vector<measures::JointSample> joint;
+  for (const Trial& trial : trials) {
+    if (!trial.object_shown || trial.others.empty()) continue;
+    joint.emplace_back();
+    joint.back().detected = is_detected(trial.together);
+    joint.back().predicted.Add(measures.predicted.Probability(trial.rotation_rad, trial.log2_scale));
+    for (const Displacement& other : trial.others) {
+      joint.back().predicted.Add(measures.predicted.Probability(other.rotation_rad, other.log2_scale));
+    }
+  }
+  measures.predicted.set_common_cause(measures::FitCommonCause(joint));
   if (!trials.empty()) measures.fingerprint = recogniser.Fingerprint();
   return measures;
 }

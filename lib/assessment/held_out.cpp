@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <opencv2/core/utility.hpp>
+#include <stdexcept>
 
 namespace vantage::assessment {
 namespace {
@@ -29,6 +30,13 @@ void InParallel(std::size_t count, const Body& body) {
 bool Truth::IsRight(const geometry::Rigid& T_camera_object, const HeldOutFrame& frame) const {
   if (!frame.T_camera_mesh) return false;
   return model::MeanPointDistance(points_in_mesh, T_camera_object * T_mesh_object.inverse(), *frame.T_camera_mesh) < correct_m;
+}
+
+Eigen::Vector3d Truth::ErrorByAxis(const geometry::Rigid& T_camera_object, const HeldOutFrame& frame) const {
+  if (!frame.T_camera_mesh) throw std::logic_error("Truth: the object is not in this frame");
+  const geometry::Rigid T_camera_mesh = T_camera_object * T_mesh_object.inverse();
+  const Eigen::Matrix3Xd off = (T_camera_mesh * points_in_mesh) - (*frame.T_camera_mesh * points_in_mesh);
+  return off.cwiseAbs().rowwise().mean();
 }
 
 std::vector<HeldOutHypothesis> Hypotheses(const std::shared_ptr<const model::ObjectModel>& object, const Truth& truth,
@@ -62,40 +70,46 @@ std::vector<ViewTrial> TryViewsAlone(const model::ObjectModel& object, const Tru
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const double rotation_rad = geometry::AngleBetween(learned.direction, seen_from[i].direction);
       if (!frames[i].counts || rotation_rad >= M_PI_2) continue;
-      const double log2_scale = std::log2(learned.distance_m / seen_from[i].distance_m);
-      trials.push_back({static_cast<int>(view), static_cast<int>(i), rotation_rad, log2_scale, false, 0.0});
+      ViewTrial trial;
+      trial.view = static_cast<int>(view);
+      trial.frame = static_cast<int>(i);
+      trial.rotation_rad = rotation_rad;
+      trial.log2_scale = std::log2(learned.distance_m / seen_from[i].distance_m);
+      trials.push_back(trial);
     }
     InParallel(trials.size() - first, [&](std::size_t k) {
       ViewTrial& trial = trials[first + k];
       const HeldOutFrame& frame = frames[static_cast<std::size_t>(trial.frame)];
       const auto detections = recogniser.Recognise(frame.frame, frame.features);
       if (detections.empty()) return;
-      trial.right = truth.IsRight(detections.front().T_camera_object, frame);
+      const geometry::Rigid& T_camera_object = detections.front().T_camera_object;
+      trial.hypothesis = true;
+      trial.right = truth.IsRight(T_camera_object, frame);
+      trial.error_m =
+          model::MeanPointDistance(truth.points_in_mesh, T_camera_object * truth.T_mesh_object.inverse(), *frame.T_camera_mesh);
+      trial.error_by_axis_m = truth.ErrorByAxis(T_camera_object, frame);
       trial.confidence = detections.front().confidence.value;
     });
   }
   return trials;
 }
 
-double DetectionRate(const std::vector<HeldOutHypothesis>& hypotheses, const std::vector<HeldOutFrame>& frames,
-                     const measures::ObservedSuccess& observed) {
-  int of = 0, detected = 0;
-  for (const HeldOutFrame& frame : frames) of += frame.counts;
+std::vector<measures::JointSample> Looks(const model::ObjectModel& object, const std::vector<HeldOutHypothesis>& hypotheses,
+                                         const std::vector<HeldOutFrame>& frames, const Truth& truth) {
+  std::vector<bool> detected(frames.size(), false);
   for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-    const HeldOutHypothesis& hypothesis = hypotheses[i];
-    const bool most_likely = i == 0 || hypotheses[i - 1].frame != hypothesis.frame;
-    if (!most_likely || !frames[static_cast<std::size_t>(hypothesis.frame)].counts) continue;
-    detected += hypothesis.right && observed.Probability(hypothesis.confidence) >= 0.5;
+    const bool most_likely = i == 0 || hypotheses[i - 1].frame != hypotheses[i].frame;
+    const bool believed = object.measures.observed.Probability(hypotheses[i].confidence) >= 0.5;
+    if (most_likely) detected[static_cast<std::size_t>(hypotheses[i].frame)] = hypotheses[i].right && believed;
   }
-  return of > 0 ? detected / static_cast<double>(of) : 0.0;
-}
-
-std::vector<measures::WeightedViewpoint> ViewpointsOf(const std::vector<HeldOutFrame>& frames, const Truth& truth) {
-  std::vector<measures::WeightedViewpoint> viewpoints;
-  for (const HeldOutFrame& frame : frames) {
-    if (frame.counts) viewpoints.push_back({ViewpointOf(*frame.T_camera_mesh * truth.T_mesh_object), 1.0});
+  std::vector<measures::JointSample> looks;
+  const auto viewpoints = object.viewpoints();
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (!frames[i].counts) continue;
+    const measures::Viewpoint seen_from = ViewpointOf(*frames[i].T_camera_mesh * truth.T_mesh_object);
+    looks.push_back({measures::Joint(viewpoints, seen_from, object.measures.predicted), detected[i]});
   }
-  return viewpoints;
+  return looks;
 }
 
 }  // namespace vantage::assessment

@@ -24,6 +24,9 @@ struct Truth {
   double correct_m = 0.04;  // Mean point distance below which a hypothesis is right.
 
   bool IsRight(const geometry::Rigid& T_camera_object, const HeldOutFrame& frame) const;
+  // How far the surface's points are off along x, y and z of the camera, mean of absolute values, metres. Throws std::logic_error
+  // where the object is not in the frame.
+  Eigen::Vector3d ErrorByAxis(const geometry::Rigid& T_camera_object, const HeldOutFrame& frame) const;
 };
 
 // A pose the recogniser proposed, however unlikely.
@@ -39,8 +42,11 @@ struct ViewTrial {
   int frame = 0;  // Index.
   double rotation_rad = 0.0;
   double log2_scale = 0.0;
-  bool right = false;       // The most likely hypothesis is right.
-  double confidence = 0.0;  // Its confidence.
+  bool hypothesis = false;  // There is one. Of the most likely:
+  bool right = false;
+  double confidence = 0.0;
+  double error_m = 0.0;                                       // Mean point distance from the truth.
+  Eigen::Vector3d error_by_axis_m = Eigen::Vector3d::Zero();  // As Truth::ErrorByAxis().
 };
 
 // Every hypothesis about the object in every frame, by frame, the most likely first. Cost: the recogniser's, once a frame, without
@@ -52,11 +58,9 @@ std::vector<HeldOutHypothesis> Hypotheses(const std::shared_ptr<const model::Obj
 std::vector<ViewTrial> TryViewsAlone(const model::ObjectModel& object, const Truth& truth, const std::vector<HeldOutFrame>& frames,
                                      const recognition::RecogniserParams& recogniser);
 
-// Share of the frames that count in which the most likely hypothesis is right and has p(o|c) >= 1/2.
-double DetectionRate(const std::vector<HeldOutHypothesis>& hypotheses, const std::vector<HeldOutFrame>& frames,
-                     const measures::ObservedSuccess& observed);
-
-// From where the frames that count show the object, each with weight 1: the p(theta) of these frames.
-std::vector<measures::WeightedViewpoint> ViewpointsOf(const std::vector<HeldOutFrame>& frames, const Truth& truth);
+// Every frame that counts: what the object's views together predict for it by the object's measures, and whether its most likely
+// hypothesis is right and has p(o|c) >= 1/2.
+std::vector<measures::JointSample> Looks(const model::ObjectModel& object, const std::vector<HeldOutHypothesis>& hypotheses,
+                                         const std::vector<HeldOutFrame>& frames, const Truth& truth);
 
 }  // namespace vantage::assessment

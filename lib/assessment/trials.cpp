@@ -1,14 +1,15 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <optional>
-#include <random>
 #include <stdexcept>
 #include <string>
 
 #include "assessment/assessor.h"
+#include "assessment/dice.h"
 #include "assessment/strength_limit.h"
 #include "assessment/virtual_object.h"
 
@@ -17,28 +18,6 @@ namespace {
 
 constexpr int kLevels = 8;     // Of noise and of blur (section VI).
 constexpr int kMaxTilts = 50;  // Draws of a direction; then it is taken wherever it is.
-
-// Draws that are the same with every standard library.
-class Dice {
- public:
-  Dice(std::uint32_t seed, int view, int trial) {
-    std::seed_seq sequence{seed, static_cast<std::uint32_t>(view), static_cast<std::uint32_t>(trial)};
-    random_.seed(sequence);
-  }
-  std::uint32_t Bits() { return static_cast<std::uint32_t>(random_()); }
-  double Uniform(double lower, double upper) { return lower + (upper - lower) * (Bits() / 4294967296.0); }
-  int Index(int count) { return static_cast<int>(static_cast<std::uint64_t>(Bits()) * static_cast<std::uint64_t>(count) >> 32); }
-  // Every level half as often as the one below: all come up, but most images of a working camera are good ones, and its own noise
-  // is in the keyframes already.
-  double Level(double max) {
-    int level = 0;
-    while (level < kLevels - 1 && Index(2) == 1) ++level;
-    return max * level / (kLevels - 1);
-  }
-
- private:
-  std::mt19937 random_;
-};
 
 // Of the camera above the object's horizon, radians.
 double Elevation(const geometry::Rigid& T_camera_object) {
@@ -65,11 +44,17 @@ cv::Mat RandomWindow(cv::Mat image, const cv::Size& size, Dice* dice) {
   return image(cv::Rect({x, y}, size));
 }
 
-// An image virtual views are pasted over.
-struct Background {
-  cv::Mat color;
-  std::optional<features::Features> features;  // Of the whole image, once they were asked for.
-};
+// Of `max`, in even levels, each `ratio` times as often as the one below: all come up, but most images of a working camera are good
+// ones, and its own noise is in the keyframes already.
+double Level(double max, double ratio, Dice* dice) {
+  double mass = 0.0, weight = 1.0;
+  for (int level = 0; level < kLevels; ++level, weight *= ratio) mass += weight;
+  double left = dice->Uniform(0.0, mass);
+  weight = 1.0;
+  int level = 0;
+  for (; level < kLevels - 1 && left >= weight; ++level, weight *= ratio) left -= weight;
+  return max * level / (kLevels - 1);
+}
 
 // Where the object is farther than it was learned, each pixel is the mean of four: the texture's filter alone is softer than a
 // lens.
@@ -85,13 +70,22 @@ VirtualImage RenderSharply(const VirtualObject& object, const geometry::PinholeC
   return image;
 }
 
+// Puts the background back over a share of the box, from one of its sides: something stands before it.
+void Hide(double share, cv::Rect box, const cv::Mat& background, Dice* dice, cv::Mat* image) {
+  const int side = dice->Index(4);
+  const int width = static_cast<int>(std::lround(share * box.width)), height = static_cast<int>(std::lround(share * box.height));
+  if (side == 1) box.x += box.width - width;
+  if (side == 3) box.y += box.height - height;
+  (side < 2 ? box.width : box.height) = side < 2 ? width : height;
+  background(box).copyTo((*image)(box));
+}
+
 // Runs the trials of one view after another.
 class TrialRunner {
  public:
-  TrialRunner(const model::ObjectModel& object, const std::vector<cv::Mat>& backgrounds,
+  TrialRunner(const model::ObjectModel& object, std::vector<Background>* backgrounds,
               const recognition::RecogniserParams& recogniser, const TrialParams& params)
-      : object_(object), surface_(object), points_(object.PointMatrix()), params_(params) {
-    for (const cv::Mat& background : backgrounds) backgrounds_.push_back({background, std::nullopt});
+      : object_(object), surface_(object), points_(object.PointMatrix()), backgrounds_(*backgrounds), params_(params) {
     recogniser_params_ = recogniser;
     recogniser_params_.use_query_depth = false;  // A virtual image is known to the recogniser by its colours only.
     recogniser_params_.min_probability = 0.0;    // Unlikely hypotheses are what is to be learned about.
@@ -101,16 +95,16 @@ class TrialRunner {
     view_ = view;
     std::vector<int> so_far(static_cast<std::size_t>(view) + 1);
     std::iota(so_far.begin(), so_far.end(), 0);
-    auto viewpoints = object_.viewpoints();
-    viewpoints.resize(so_far.size());
-    median_distance_m_ = MedianDistance(viewpoints);
+    viewpoints_ = object_.viewpoints();
+    viewpoints_.resize(so_far.size());
+    median_distance_m_ = MedianDistance(viewpoints_);
     alone_ = RecogniserOf(object_.OnlyView(view));
     together_ = RecogniserOf(object_.OnlyViews(so_far));
   }
 
   // The dice depend on seed, view and trial only: what was run before makes no difference.
   Trial Run(int number) {
-    Dice dice(params_.seed, view_, number);
+    Dice dice({params_.seed, static_cast<std::uint32_t>(view_), static_cast<std::uint32_t>(number)});
     Trial trial;
     trial.view = view_;
     VirtualPose pose;
@@ -131,17 +125,22 @@ class TrialRunner {
     // A close object may be twice the size.
     frame.camera = surface_.Window(view_, T_camera_object, 2 * params_.image_width, 2 * params_.image_height);
     const cv::Mat window = Window(frame.camera, &dice);
-    frame.color = Paste(RenderSharply(surface_, frame.camera, T_camera_object, pose.log2_scale < 0.0), window);
+    const VirtualImage shown = RenderSharply(surface_, frame.camera, T_camera_object, pose.log2_scale < 0.0);
+    frame.color = Paste(shown, window);
+    if (params_.max_occlusion > 0.0) {
+      Hide(dice.Uniform(0.0, params_.max_occlusion), cv::boundingRect(shown.mask), window, &dice, &frame.color);
+    }
     Disturb(disturbance, dice.Bits(), &frame.color);
     const features::Features features = Strongest(alone_->Extract(frame), MinResponse(disturbance));
     trial.alone = Propose(*alone_, frame, features, T_camera_object);
     trial.together = view_ == 0 ? trial.alone : Propose(*together_, frame, features, T_camera_object);
+    trial.others = Others(T_camera_object);
     return trial;
   }
 
   // A whole background where there is one.
   Trial RunNegative(int number) {
-    Dice dice(params_.seed, view_, number);
+    Dice dice({params_.seed, static_cast<std::uint32_t>(view_), static_cast<std::uint32_t>(number)});
     Trial trial;
     trial.view = view_;
     trial.object_shown = false;
@@ -176,6 +175,19 @@ class TrialRunner {
  private:
   const model::View& View() const { return object_.views[static_cast<std::size_t>(view_)]; }
 
+  // Of the views before this one.
+  std::vector<Displacement> Others(const geometry::Rigid& T_camera_object) const {
+    const Eigen::Vector3d direction = geometry::ViewDirection(T_camera_object);
+    const double distance_m = T_camera_object.inverse().translation().norm();
+    std::vector<Displacement> others;
+    for (int i = 0; i < view_; ++i) {
+      const measures::Viewpoint& learned = viewpoints_[static_cast<std::size_t>(i)];
+      const double rotation_rad = geometry::AngleBetween(learned.direction, direction);
+      if (rotation_rad < M_PI_2) others.push_back({rotation_rad, std::log2(learned.distance_m / distance_m)});
+    }
+    return others;
+  }
+
   std::unique_ptr<recognition::Recogniser> RecogniserOf(model::ObjectModel object) const {
     auto recogniser = std::make_unique<recognition::Recogniser>(recogniser_params_);
     recogniser->Set(std::make_shared<model::ObjectModel>(std::move(object)));
@@ -186,8 +198,8 @@ class TrialRunner {
     Disturbance disturbance;
     disturbance.brightness = 1.0 + dice->Uniform(-params_.max_brightness, params_.max_brightness);
     disturbance.gamma = 1.0 + dice->Uniform(-params_.max_brightness, params_.max_brightness);
-    disturbance.image_noise = trial->image_noise = dice->Level(params_.max_image_noise);
-    disturbance.blur_px = trial->blur_px = dice->Level(params_.max_blur_px);
+    disturbance.image_noise = trial->image_noise = Level(params_.max_image_noise, params_.level_ratio, dice);
+    disturbance.blur_px = trial->blur_px = Level(params_.max_blur_px, params_.level_ratio, dice);
     return disturbance;
   }
 
@@ -195,7 +207,7 @@ class TrialRunner {
     if (!background->features) {
       rgbd::Frame frame;
       frame.color = background->color;
-      background->features = together_->Extract(frame);
+      background->features = std::make_shared<const features::Features>(together_->Extract(frame));
     }
     return *background->features;
   }
@@ -222,9 +234,9 @@ class TrialRunner {
                                 const features::Features& features, const std::optional<geometry::Rigid>& T_camera_object) const {
     std::vector<Proposal> proposals;
     for (const recognition::Detection& detection : recogniser.Recognise(frame, features)) {
-      const bool correct =
-          T_camera_object && model::MeanPointDistance(points_, detection.T_camera_object, *T_camera_object) < params_.correct_m;
-      proposals.push_back({detection.confidence.value, correct});
+      const double error_m = T_camera_object ? model::MeanPointDistance(points_, detection.T_camera_object, *T_camera_object)
+                                             : std::numeric_limits<double>::infinity();
+      proposals.push_back({detection.confidence.value, error_m < params_.correct_m, error_m});
     }
     return proposals;
   }
@@ -232,14 +244,15 @@ class TrialRunner {
   const model::ObjectModel& object_;
   const VirtualObject surface_;
   const Eigen::Matrix3Xd points_;
-  std::vector<Background> backgrounds_;
+  std::vector<Background>& backgrounds_;
   std::optional<StrengthLimit> limit_;
   const TrialParams& params_;
   recognition::RecogniserParams recogniser_params_;
   std::unique_ptr<recognition::Recogniser> alone_;     // The view.
   std::unique_ptr<recognition::Recogniser> together_;  // All views up to this one.
   int view_ = 0;
-  double median_distance_m_ = 1.0;  // Of the views up to this one.
+  std::vector<measures::Viewpoint> viewpoints_;  // Of the views up to this one.
+  double median_distance_m_ = 1.0;               // Of these.
 };
 
 }  // namespace
@@ -255,18 +268,21 @@ void TrialParams::Check() const {
   require(max_scale_octaves >= 0.0, "max_scale_octaves must be >= 0");
   require(max_image_noise >= 0.0, "max_image_noise must be >= 0");
   require(max_blur_px >= 0.0, "max_blur_px must be >= 0");
+  require(level_ratio > 0.0 && level_ratio <= 1.0, "level_ratio must be in (0, 1]");
+  require(max_occlusion >= 0.0 && max_occlusion < 1.0, "max_occlusion must be in [0, 1)");
   require(max_brightness >= 0.0 && max_brightness < 1.0, "max_brightness must be in [0, 1)");
   require(correct_m > 0.0, "correct_m must be > 0");
   require(image_width >= 64, "image_width must be >= 64");
   require(image_height >= 64, "image_height must be >= 64");
 }
 
-std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, const std::vector<cv::Mat>& backgrounds,
+std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, std::vector<Background>* backgrounds,
                              const recognition::RecogniserParams& recogniser, const TrialParams& params,
                              const std::function<void(int done, int of)>& progress) {
   params.Check();
-  for (const cv::Mat& background : backgrounds) {
-    if (background.empty() || background.type() != CV_8UC3) throw std::invalid_argument("RunTrials: backgrounds must be CV_8UC3");
+  for (const Background& background : *backgrounds) {
+    if (background.color.empty() || background.color.type() != CV_8UC3)
+      throw std::invalid_argument("RunTrials: backgrounds must be CV_8UC3");
   }
   if (first_view < 0) throw std::invalid_argument("RunTrials: first_view must be >= 0");
   std::vector<Trial> trials;

@@ -6,31 +6,14 @@
 #include "geometry/rigid.h"
 
 namespace vantage::exploration {
-namespace {
-
-// By how much one more view of probability p raises the combined probability of the others.
-double Rise(double combined, double p, measures::CompletenessRule rule) {
-  switch (rule) {
-    case measures::CompletenessRule::kNoisyOr:
-      return (1.0 - combined) * p;
-    case measures::CompletenessRule::kClippedSum:
-      return std::min(1.0 - combined, p);
-    case measures::CompletenessRule::kMax:
-      break;
-  }
-  return std::max(0.0, p - combined);
-}
-
-}  // namespace
-
 GainScorer::GainScorer(const Belief& belief, measures::CompletenessRule rule) : belief_(belief), rule_(rule) {
   completeness_ = measures::Completeness(belief.views, belief.reachable, belief.predicted, rule);
   double total = 0.0;
   for (const measures::WeightedViewpoint& query : belief.reachable) total += query.weight;
   for (const measures::WeightedViewpoint& query : belief.reachable) {
     if (query.weight == 0.0) continue;
-    const double probability = measures::DetectionProbability(belief.views, query.viewpoint, belief.predicted, rule);
-    if (probability < 1.0) queries_.push_back({query.viewpoint, query.weight / total, probability});
+    const auto so_far = measures::Joint(belief.views, query.viewpoint, belief.predicted);
+    if (ValueOf(so_far) < 1.0) queries_.push_back({query.viewpoint, query.weight / total, so_far});
   }
 }
 
@@ -39,10 +22,15 @@ double GainScorer::Gain(const measures::Viewpoint& view) const {
   double gain = 0.0;
   for (const Query& query : queries_) {
     if (view.direction.dot(query.viewpoint.direction) <= 0.0) continue;  // From 90 degrees on the view shows nothing of it.
-    gain +=
-        query.weight * Rise(query.probability, measures::DetectionProbability(alone, query.viewpoint, belief_.predicted), rule_);
+    measures::JointProbability with_view = query.so_far;
+    with_view.Add(measures::DetectionProbability(alone, query.viewpoint, belief_.predicted));
+    gain += query.weight * (ValueOf(with_view) - ValueOf(query.so_far));
   }
   return gain;
+}
+
+double GainScorer::ValueOf(const measures::JointProbability& joint) const {
+  return joint.Value(rule_, belief_.predicted.common_cause());
 }
 
 void FailureMemory::Note(const Attempt& attempt) {

@@ -22,9 +22,11 @@ class GainScorer {
  private:
   struct Query {
     measures::Viewpoint viewpoint;
-    double weight = 0.0;       // All sum to 1.
-    double probability = 0.0;  // With the views learned so far.
+    double weight = 0.0;                // All sum to 1.
+    measures::JointProbability so_far;  // Of the views learned.
   };
+
+  double ValueOf(const measures::JointProbability& joint) const;
 
   const Belief& belief_;
   measures::CompletenessRule rule_;

@@ -116,6 +116,7 @@ struct Learner::Impl {
     model::ObjectModel empty;
     empty.name = name;
     empty.feature_fingerprint = params.recogniser.features.Fingerprint();
+    empty.measures.observed = others.Pooled();  // Until it has its own.
     auto first = WithView(empty, frame, mask, features, T_camera_object, {}, params.min_view_points);
     if (!first) {
       result.note = "too few interest points with depth on the object";

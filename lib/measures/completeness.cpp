@@ -9,14 +9,18 @@
 namespace vantage::measures {
 
 CompletenessRule CompletenessRuleFromString(const std::string& text) {
-  for (CompletenessRule rule : {CompletenessRule::kMax, CompletenessRule::kNoisyOr, CompletenessRule::kClippedSum}) {
+  std::string names;
+  for (const CompletenessRule rule : kCompletenessRules) {
     if (ToString(rule) == text) return rule;
+    names += (names.empty() ? "" : ", ") + ToString(rule);
   }
-  throw std::invalid_argument("the completeness rule must be max, noisy_or or clipped_sum, is \"" + text + "\"");
+  throw std::invalid_argument("the completeness rule must be one of " + names + ", is \"" + text + "\"");
 }
 
 std::string ToString(CompletenessRule rule) {
   switch (rule) {
+    case CompletenessRule::kCommonCause:
+      return "common_cause";
     case CompletenessRule::kNoisyOr:
       return "noisy_or";
     case CompletenessRule::kClippedSum:
@@ -27,29 +31,58 @@ std::string ToString(CompletenessRule rule) {
   return "max";
 }
 
-double DetectionProbability(const std::vector<Viewpoint>& views, const Viewpoint& query, const PredictedSuccess& predicted,
-                            CompletenessRule rule) {
-  double largest = 0.0, all_fail = 1.0, sum = 0.0;
+double JointProbability::Value(CompletenessRule rule, double common_cause) const {
+  switch (rule) {
+    case CompletenessRule::kCommonCause:
+      return common_cause * largest_ + (1.0 - common_cause) * (1.0 - all_fail_);
+    case CompletenessRule::kNoisyOr:
+      return 1.0 - all_fail_;
+    case CompletenessRule::kClippedSum:
+      return std::min(1.0, sum_);
+    case CompletenessRule::kMax:
+      break;
+  }
+  return largest_;
+}
+
+JointProbability Joint(const std::vector<Viewpoint>& views, const Viewpoint& query, const PredictedSuccess& predicted) {
+  JointProbability joint;
   for (const Viewpoint& view : views) {
     if (!(view.distance_m > 0.0) || !(query.distance_m > 0.0)) {
       throw std::invalid_argument("DetectionProbability: a viewpoint's distance_m must be > 0");
     }
     const double rotation_rad = geometry::AngleBetween(view.direction, query.direction);
-    if (rotation_rad >= M_PI_2) continue;
-    const double p = predicted.Probability(rotation_rad, std::log2(view.distance_m / query.distance_m));
-    largest = std::max(largest, p);
-    all_fail *= 1.0 - p;
-    sum += p;
+    if (rotation_rad < M_PI_2) joint.Add(predicted.Probability(rotation_rad, std::log2(view.distance_m / query.distance_m)));
   }
-  switch (rule) {
-    case CompletenessRule::kNoisyOr:
-      return 1.0 - all_fail;
-    case CompletenessRule::kClippedSum:
-      return std::min(1.0, sum);
-    case CompletenessRule::kMax:
-      break;
+  return joint;
+}
+
+double FitCommonCause(const std::vector<JointSample>& samples) {
+  constexpr int kSteps = 50;
+  constexpr double kSurest = 0.002;  // Single outcomes never rule a share out.
+  std::array<double, kSteps + 1> log_posterior{};
+  for (int i = 0; i <= kSteps; ++i) {
+    const double share = static_cast<double>(i) / kSteps;
+    const double prior = std::pow(share * (1.0 - share), 2);  // Beta(3, 3), not normalised.
+    double& sum = log_posterior[static_cast<std::size_t>(i)] = std::log(std::max(prior, 1e-12));
+    for (const JointSample& sample : samples) {
+      const double p = std::clamp(sample.predicted.Value(CompletenessRule::kCommonCause, share), kSurest, 1.0 - kSurest);
+      sum += std::log(sample.detected ? p : 1.0 - p);
+    }
   }
-  return largest;
+  const double most = *std::max_element(log_posterior.begin(), log_posterior.end());
+  double mean = 0.0, mass = 0.0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double weight = std::exp(log_posterior[static_cast<std::size_t>(i)] - most);
+    mean += weight * i / kSteps;
+    mass += weight;
+  }
+  return mean / mass;
+}
+
+double DetectionProbability(const std::vector<Viewpoint>& views, const Viewpoint& query, const PredictedSuccess& predicted,
+                            CompletenessRule rule) {
+  return Joint(views, query, predicted).Value(rule, predicted.common_cause());
 }
 
 double Completeness(const std::vector<Viewpoint>& views, const std::vector<WeightedViewpoint>& queries,

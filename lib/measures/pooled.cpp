@@ -38,7 +38,7 @@ ObservedSuccess PooledObserved(const std::vector<ObservedSuccess>& measures) {
 PredictedSuccess PooledPredicted(const std::vector<PredictedSuccess>& measures) {
   std::vector<double> trials, successes;
   int objects = 0;
-  double prior_count = 0.0;
+  double prior_count = 0.0, common_cause = 0.0;
   for (const PredictedSuccess& measure : measures) {
     if (measure.source() != Source::kOwn) continue;
     trials.resize(measure.trial_counts().size());
@@ -48,12 +48,15 @@ PredictedSuccess PooledPredicted(const std::vector<PredictedSuccess>& measures) 
       successes[i] += measure.success_counts()[i];
     }
     prior_count = measure.prior_count();
+    common_cause += measure.common_cause();
     ++objects;
   }
   if (objects == 0) return {};
   for (double& count : trials) count /= objects;
   for (double& count : successes) count /= objects;
-  return PredictedSuccess::FromCounts(std::move(trials), std::move(successes), Source::kPooled, prior_count);
+  auto pooled = PredictedSuccess::FromCounts(std::move(trials), std::move(successes), Source::kPooled, prior_count);
+  pooled.set_common_cause(common_cause / objects);
+  return pooled;
 }
 
 Measures Pooled(const std::vector<Measures>& measures, const std::string& fingerprint) {

@@ -215,6 +215,13 @@ double PredictedSuccess::HalfwayRotation() const {
   return below;
 }
 
+void PredictedSuccess::set_common_cause(double share) {
+  if (!(share >= 0.0 && share <= 1.0)) {
+    throw std::invalid_argument("PredictedSuccess: common_cause must be in [0, 1], is " + std::to_string(share));
+  }
+  common_cause_ = share;
+}
+
 int PredictedSuccess::trials() const { return static_cast<int>(std::lround(std::accumulate(trials_.begin(), trials_.end(), 0.0))); }
 
 }  // namespace vantage::measures

@@ -25,6 +25,7 @@ class PredictedSuccess {
   static constexpr int kScaleCells = 5;      // Half an octave each, centred at -1 .. +1.
   static constexpr double kRotationStepRad = 0.08726646259971647;
   static constexpr double kScaleStep = 0.5;
+  static constexpr double kDefaultCommonCause = 0.5;
 
   PredictedSuccess();  // The shipped default (no trials).
   static PredictedSuccess Fit(const std::vector<PredictionSample>& samples, Source source, double prior_count = 4.0);
@@ -39,6 +40,11 @@ class PredictedSuccess {
   Source source() const { return source_; }
   int trials() const;
   double prior_count() const { return prior_count_; }
+  // Where several learned views are on offer: the share of failures that come to all of them at once, [0, 1] (see
+  // CompletenessRule).
+  double common_cause() const { return common_cause_; }
+  // Throws std::invalid_argument where it is not in [0, 1].
+  void set_common_cause(double share);
   // Counts per cell, index rotation_cell * kScaleCells + scale_cell. A trial between cell centres counts for each in part.
   const std::vector<double>& trial_counts() const { return trials_; }
   const std::vector<double>& success_counts() const { return successes_; }
@@ -53,6 +59,7 @@ class PredictedSuccess {
   std::vector<double> successes_;
   std::vector<double> table_;  // Smoothed and monotone probability per cell.
   double prior_count_ = 4.0;
+  double common_cause_ = kDefaultCommonCause;
   Source source_ = Source::kDefault;
 };
 

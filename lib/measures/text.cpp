@@ -45,6 +45,7 @@ std::string ToText(const Measures& measures) {
   json["predicted"] = {{"trials", predicted.trial_counts()},
                        {"successes", predicted.success_counts()},
                        {"prior_count", predicted.prior_count()},
+                       {"common_cause", predicted.common_cause()},
                        {"source", ToString(predicted.source())}};
   json["fingerprint"] = measures.fingerprint;
   return json.dump();
@@ -59,6 +60,7 @@ Measures MeasuresFromText(const std::string& text) {
     measures.predicted = PredictedSuccess::FromCounts(
         predicted.at("trials").get<std::vector<double>>(), predicted.at("successes").get<std::vector<double>>(),
         SourceFromString(predicted.at("source").get<std::string>()), predicted.at("prior_count").get<double>());
+    measures.predicted.set_common_cause(predicted.value("common_cause", PredictedSuccess::kDefaultCommonCause));  // As above.
     measures.fingerprint = json.at("fingerprint").get<std::string>();
     return measures;
   } catch (const std::exception& error) {

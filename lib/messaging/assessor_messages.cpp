@@ -79,6 +79,7 @@ measures_t ToMessage(const ObjectMeasures& measures) {
   message.successes = measures.measures.predicted.success_counts();
   message.cells = static_cast<std::int16_t>(message.trials.size());
   message.prior_count = measures.measures.predicted.prior_count();
+  message.common_cause = measures.measures.predicted.common_cause();
   message.completeness = measures.completeness;
   return message;
 }
@@ -107,6 +108,7 @@ Result<ObjectMeasures> FromMessage(const measures_t& message) {
     result.measures.observed = Observed(message, *positive, *negative);
     result.measures.predicted = measures::PredictedSuccess::FromCounts(
         message.trials, message.successes, measures::SourceFromString(message.predicted_source), message.prior_count);
+    result.measures.predicted.set_common_cause(message.common_cause);
   } catch (const std::invalid_argument& error) {
     return Measures::Error(error.what());
   }

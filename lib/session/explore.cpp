@@ -113,7 +113,7 @@ class Run {
     AddBackground(frame);
     assessment::TrialParams trials = params_.trials;
     trials.seed += params_.seed;
-    const auto fresh = assessment::RunTrials(*object, newest, backgrounds_, params_.learner.recogniser, trials);
+    const auto fresh = assessment::RunTrials(*object, newest, &backgrounds_, params_.learner.recogniser, trials);
     trials_.insert(trials_.end(), fresh.begin(), fresh.end());
     learner_.SetMeasures(assessment::FitMeasures(trials_, params_.learner.recogniser, params_.trials.observed_fit));
     ListCandidates();
@@ -130,7 +130,7 @@ class Run {
     if (static_cast<int>(backgrounds_.size()) >= params_.max_backgrounds) return;
     cv::Mat objects = cv::Mat::zeros(frame.color.size(), CV_8UC1);
     for (const segmentation::Cluster& cluster : learner_.clusters()) objects |= cluster.mask;
-    backgrounds_.push_back(assessment::MaskedBackground(frame.color, objects));
+    backgrounds_.push_back({assessment::MaskedBackground(frame.color, objects), nullptr});
   }
 
   void NoteScene(const rgbd::Frame& frame) {
@@ -201,7 +201,7 @@ class Run {
   std::unique_ptr<exploration::Strategy> strategy_;
   geometry::Rigid pose_ = geometry::Rigid::Identity();  // T_world_camera now.
   motion::Obstacles obstacles_;
-  std::vector<cv::Mat> backgrounds_;
+  std::vector<assessment::Background> backgrounds_;
   std::vector<assessment::Trial> trials_;
   std::vector<exploration::CandidateView> candidates_;
   std::vector<measures::WeightedViewpoint> reachable_;

@@ -35,6 +35,8 @@ void AssessorNodeParams::Check() const {
   require(azimuth_cells >= 1 && azimuth_cells <= 360, "azimuth_cells must be in 1..360");
   require(elevation_cells >= 1 && elevation_cells <= 180, "elevation_cells must be in 1..180");
   require(min_elevation_rad < max_elevation_rad, "min_elevation_rad must be < max_elevation_rad");
+  require(std::all_of(distances_m.begin(), distances_m.end(), [](double distance) { return distance > 0.0; }),
+          "distances_m must be > 0");
   require(publish_period_s > 0.0, "publish_period_s must be > 0");
   require(retry_period_s > 0.0, "retry_period_s must be > 0");
   require(max_backgrounds >= 0, "max_backgrounds must be >= 0");
@@ -61,6 +63,7 @@ AssessorNodeParams LoadAssessorNodeParams(const std::string& config_file, const 
   yaml.Get("elevation_cells", params.elevation_cells);
   yaml.Get("min_elevation_rad", params.min_elevation_rad);
   yaml.Get("max_elevation_rad", params.max_elevation_rad);
+  yaml.Get("distances_m", params.distances_m);
   yaml.Get("publish_period_s", params.publish_period_s);
   yaml.Get("retry_period_s", params.retry_period_s);
   yaml.Get("max_backgrounds", params.max_backgrounds);
@@ -219,9 +222,12 @@ void AssessorNode::OnAssessment(const Assessment& assessment) {
 }
 
 double AssessorNode::CompletenessOf(const Object& object) const {
-  const auto queries = object.reach.empty() ? assessment::UniformViewpoints(params_.min_elevation_rad, params_.max_elevation_rad,
-                                                                            {assessment::MedianDistance(object.viewpoints)})
-                                            : object.reach;
+  auto queries = object.reach;
+  if (queries.empty()) {
+    const std::vector<double> as_learned = {assessment::MedianDistance(object.viewpoints)};
+    queries = assessment::UniformViewpoints(params_.min_elevation_rad, params_.max_elevation_rad,
+                                            params_.distances_m.empty() ? as_learned : params_.distances_m);
+  }
   return measures::Completeness(object.viewpoints, queries, object.measures.predicted, rule_);
 }
 

@@ -21,7 +21,8 @@ struct AssessorNodeParams {
   int azimuth_cells = 36;           // Of the sphere that is published; 1..360.
   int elevation_cells = 18;         // Likewise; 1..180.
   double min_elevation_rad = 0.17;  // Until PLANNER_REACH says what can be seen: the sphere between these...
-  double max_elevation_rad = 1.4;   // ...counts.
+  double max_elevation_rad = 1.4;   // ...counts, from...
+  std::vector<double> distances_m;  // ...these distances, each > 0; empty: from the median distance of the views.
   double publish_period_s = 1.0;    // > 0.
   double retry_period_s = 5.0;      // After an error; > 0.
   int max_backgrounds = 8;          // Of the run's own frames; >= 0.

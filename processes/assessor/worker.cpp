@@ -88,8 +88,7 @@ void Worker::Run() {
   }
 }
 
-Worker::Known& Worker::Read(const std::string& object) {
-  const model::Store store(params_.store, model::Store::Mode::kRead);
+Worker::Known& Worker::Read(const model::Store& store, const std::string& object) {
   auto model = store.Load(object);
   if (!model || model->views.empty()) throw std::runtime_error(params_.store + ": no views of '" + object + "'");
   Known& known = known_[object];
@@ -110,7 +109,9 @@ Worker::Known& Worker::Read(const std::string& object) {
 
 Assessment Worker::Assess(const std::string& object, const std::optional<rgbd::Frame>& frame) {
   if (frame) AddBackground(*frame);
-  Known& known = Read(object);
+  const model::Store store(params_.store, model::Store::Mode::kRead);
+  Known& known = Read(store, object);
+  AddLookAlikes(store, object);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     reading_ = false;
@@ -121,7 +122,11 @@ Assessment Worker::Assess(const std::string& object, const std::optional<rgbd::F
   if (next != views.end()) {
     std::vector<int> first_views(static_cast<std::size_t>(next - views.begin()) + 1);
     std::iota(first_views.begin(), first_views.end(), 0);
-    known.trials[next->id] = assessment::RunTrials(known.model->OnlyViews(first_views), first_views.back(), backgrounds_,
+    std::vector<assessment::Background> backgrounds = backgrounds_;
+    for (const auto& [name, lookalike] : lookalikes_) {
+      if (name != object) backgrounds.push_back(lookalike);
+    }
+    known.trials[next->id] = assessment::RunTrials(known.model->OnlyViews(first_views), first_views.back(), &backgrounds,
                                                    params_.recogniser, params_.trials, [this](int done, int of) {
                                                      if (stop_) throw BrokenOff();
                                                      progress_ = static_cast<double>(done) / of;
@@ -145,7 +150,24 @@ void Worker::AddBackground(const rgbd::Frame& frame) {
   if (!plane) return;  // Where objects cannot be masked, they would be taken for background.
   cv::Mat objects = cv::Mat::zeros(frame.color.size(), CV_8UC1);
   for (const auto& cluster : segmentation::FindClusters(frame, *plane, params_.clusters)) objects |= cluster.mask;
-  backgrounds_.push_back(assessment::MaskedBackground(frame.color, objects));
+  backgrounds_.push_back(WithFeatures(assessment::MaskedBackground(frame.color, objects)));
+}
+
+void Worker::AddLookAlikes(const model::Store& store, const std::string& object) {
+  if (backgrounds_.empty()) return;
+  for (const model::Store::Summary& summary : store.List()) {
+    if (static_cast<int>(lookalikes_.size()) >= params_.max_lookalikes) return;
+    if (summary.name == object || summary.views == 0 || lookalikes_.count(summary.name)) continue;
+    const auto other = store.Load(summary.name);
+    const auto seed = static_cast<std::uint32_t>(lookalikes_.size());
+    if (other) lookalikes_[summary.name] = WithFeatures(assessment::WithLookAlike(backgrounds_.front().color, *other, seed));
+  }
+}
+
+assessment::Background Worker::WithFeatures(const cv::Mat& color) const {
+  rgbd::Frame frame;
+  frame.color = color;
+  return {color, std::make_shared<const features::Features>(recognition::Recogniser(params_.recogniser).Extract(frame))};
 }
 
 }  // namespace vantage::assessor

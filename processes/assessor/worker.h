@@ -26,6 +26,7 @@ struct WorkerParams {
   segmentation::PlaneParams plane;  // To find what is background in the run's own frames.
   segmentation::ClusterParams clusters;
   int max_backgrounds = 8;  // >= 0.
+  int max_lookalikes = 4;   // Other objects of the store that must not be taken for the one at hand, as they look on a table; >= 0.
   int niceness = 5;         // Of the thread: sensor and learner go first; 0..19.
 };
 
@@ -69,12 +70,16 @@ class Worker {
   void Run();
   Assessment Assess(const std::string& object, const std::optional<rgbd::Frame>& frame);
   // Reads the store; trials of views that are no more are forgotten.
-  Known& Read(const std::string& object);
+  Known& Read(const model::Store& store, const std::string& object);
   void AddBackground(const rgbd::Frame& frame);
+  // Of the store's other objects, each once and as it is then, in the first background.
+  void AddLookAlikes(const model::Store& store, const std::string& object);
+  assessment::Background WithFeatures(const cv::Mat& color) const;
 
   WorkerParams params_;
-  std::map<std::string, Known> known_;  // The thread's own.
-  std::vector<cv::Mat> backgrounds_;    // Likewise.
+  std::map<std::string, Known> known_;                        // The thread's own.
+  std::vector<assessment::Background> backgrounds_;           // Likewise; they show no objects.
+  std::map<std::string, assessment::Background> lookalikes_;  // Likewise, but the object of that name.
 
   std::mutex mutex_;
   std::condition_variable wake_;

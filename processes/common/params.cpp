@@ -221,7 +221,9 @@ void Fields(Visitor& visit, assessment::TrialParams& params) {
   visit("max_scale_octaves", params.max_scale_octaves);
   visit("max_image_noise", params.max_image_noise);
   visit("max_blur_px", params.max_blur_px);
+  visit("level_ratio", params.level_ratio);
   visit("max_brightness", params.max_brightness);
+  visit("max_occlusion", params.max_occlusion);
   visit("correct_m", params.correct_m);
   visit("image_width", params.image_width);
   visit("image_height", params.image_height);

@@ -2,56 +2,39 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
 #include "assessment/assessor.h"
-#include "assessment/background.h"
 #include "geometry/view_sphere.h"
 #include "model/store.h"
-#include "vantage/trial_record.h"
+#include "vantage/held_out_frames.h"
+#include "vantage/known_views.h"
+#include "vantage/object_trials.h"
+#include "vantage/report.h"
+#include "vantage/sequence.h"
+#include "vantage/truth_judge.h"
 #include "vantage/verb.h"
 
 namespace vantage::cli {
 namespace {
 
-constexpr int kFullImages = 10000;            // An object; the paper's scale.
-constexpr std::size_t kFullBackgrounds = 16;  // Interest points of each are found once for every view.
+constexpr int kReportImages = 1000;  // An object.
+constexpr int kFullImages = 10000;   // An object; the paper's scale.
 
 struct AssessOptions {
   CommonOptions common;
   std::string store;
-  std::string object;        // Empty = every one.
-  std::string backgrounds;   // Folder of images; empty = what is around the objects in their own views.
-  int images = 0;            // Virtual images an object, kept on disk; 0 = as many as the parameters say, not kept.
-  std::string predict;       // Only say how likely this object would be detected...
-  std::vector<double> from;  // ...from this place of the camera in the object's frame, metres.
+  std::string object;          // Empty = every one.
+  std::string backgrounds;     // Folder of images; empty = what is around the objects in their own views.
+  int images = 0;              // Virtual images an object, kept on disk; 0 = as many as the parameters say, not kept.
+  std::string report;          // Folder: only report on the objects...
+  std::string sequence;        // ...with photographs of this recording...
+  int object_id = 0;           // ...that show this object of its truth...
+  std::string truth_object;    // ...which is this one of the store; empty: its first...
+  std::string frames = "odd";  // ...and in these frames, from which nothing was learned.
+  std::string predict;         // Only say how likely this object would be detected...
+  std::vector<double> from;    // ...from this place of the camera in the object's frame, metres.
 };
-
-// The folder's images by name; other files are passed over.
-std::vector<cv::Mat> ReadBackgrounds(const std::filesystem::path& folder) {
-  if (!std::filesystem::is_directory(folder)) throw std::runtime_error(folder.string() + ": no such folder of background images");
-  std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.is_regular_file() && cv::haveImageReader(entry.path().string())) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  std::vector<cv::Mat> images;
-  for (const std::filesystem::path& file : files) {
-    cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR);
-    if (!image.empty()) images.push_back(std::move(image));
-  }
-  if (images.empty()) throw std::runtime_error(folder.string() + ": holds no images that can be read");
-  return images;
-}
-
-std::vector<cv::Mat> OwnBackgrounds(const model::ObjectModel& object) {
-  std::vector<cv::Mat> images;
-  for (const model::View& view : object.views) {
-    if (!view.mask.empty()) images.push_back(assessment::MaskedBackground(view.keyframe.color, view.mask));
-  }
-  return images;
-}
 
 Json ToJson(const measures::Gaussian& gaussian) {
   return {{"mean", gaussian.mean}, {"sigma", gaussian.sigma}, {"count", gaussian.count}};
@@ -83,70 +66,6 @@ Json ToJson(const model::ObjectModel& object, const measures::Measures& fitted, 
   entry["observed"] = std::move(observed);
   entry["predicted"] = std::move(predicted);
   return entry;
-}
-
-void Tell(const std::string& name, int done, int of) {
-  if (done % 10 == 0 || done == of) std::cerr << '\r' << name << ": " << done << " of " << of << " virtual images" << std::flush;
-  if (done == of) std::cerr << '\n';
-}
-
-// Evenly chosen.
-std::vector<cv::Mat> AtMost(std::size_t count, const std::vector<cv::Mat>& images) {
-  std::vector<cv::Mat> chosen;
-  for (std::size_t i = 0; i < std::min(count, images.size()); ++i) {
-    chosen.push_back(images[i * images.size() / std::min(count, images.size())]);
-  }
-  return chosen;
-}
-
-// What kept trials hold for: all that they depend on but their number.
-std::string KeyOf(const AssessOptions& options, const std::string& object, const params::LibraryParams& params) {
-  std::string key = object + "|" + options.backgrounds;
-  for (const auto& [name, value] : params::Flatten(params)) {
-    const bool of_trials = name.rfind("recogniser.", 0) == 0 || name.rfind("trials.", 0) == 0;
-    if (of_trials && name != "trials.trials_per_view" && name != "trials.observed_fit") key += "|" + name + "=" + value;
-  }
-  return key;
-}
-
-int Shown(const std::vector<assessment::Trial>& trials) {
-  return static_cast<int>(
-      std::count_if(trials.begin(), trials.end(), [](const assessment::Trial& one) { return one.object_shown; }));
-}
-
-// View by view, each with those before it as the assessor process has them, and each on disk before the next. A view that has
-// enough trials keeps all of them.
-std::vector<assessment::Trial> KeptTrials(const AssessOptions& options, const model::ObjectModel& object,
-                                          const std::vector<cv::Mat>& all_backgrounds, const params::LibraryParams& params) {
-  const std::vector<cv::Mat> backgrounds = AtMost(kFullBackgrounds, all_backgrounds);
-  const int views = static_cast<int>(object.views.size());
-  assessment::TrialParams trials = params.trials;
-  trials.trials_per_view = std::max(1, (options.images + views - 1) / views - trials.negatives_per_view);
-  TrialRecord record(options.store + ".trials", KeyOf(options, object.name, params));
-  std::vector<assessment::Trial> result;
-  std::vector<int> so_far;
-  for (int view = 0; view < views; ++view) {
-    so_far.push_back(view);
-    const model::View& learned = object.views[static_cast<std::size_t>(view)];
-    if (learned.points.empty() || learned.keyframe.depth.empty()) continue;  // Nothing that could be shown or recognised.
-    const auto* known = record.Find(learned.id, learned.utime);
-    if (known == nullptr || Shown(*known) < trials.trials_per_view) {
-      const std::string name = object.name + ", view " + std::to_string(view + 1) + " of " + std::to_string(views);
-      record.Add(learned.id, learned.utime,
-                 assessment::RunTrials(object.OnlyViews(so_far), view, backgrounds, params.recogniser, trials,
-                                       [&](int done, int of) { Tell(name, done, of); }));
-      known = record.Find(learned.id, learned.utime);
-    }
-    result.insert(result.end(), known->begin(), known->end());
-  }
-  return result;
-}
-
-std::vector<assessment::Trial> TrialsOf(const AssessOptions& options, const model::ObjectModel& object,
-                                        const std::vector<cv::Mat>& backgrounds, const params::LibraryParams& params) {
-  if (options.images > 0) return KeptTrials(options, object, backgrounds, params);
-  return assessment::RunTrials(object, 0, backgrounds, params.recogniser, params.trials,
-                               [&](int done, int of) { Tell(object.name, done, of); });
 }
 
 // How likely the object would be detected from a place, by its stored measures.
@@ -204,8 +123,6 @@ void RunAssess(const AssessOptions& options) {
   if (!std::filesystem::exists(options.store)) model::Store(options.store, model::Store::Mode::kRead);  // Says that it is missing.
   model::Store store(options.store, model::Store::Mode::kWrite);
   const std::vector<std::string> names = NamesToAssess(options, store);
-  const std::vector<cv::Mat> backgrounds =
-      options.backgrounds.empty() ? std::vector<cv::Mat>() : ReadBackgrounds(options.backgrounds);
 
   Json result;
   result["store"] = options.store;
@@ -216,8 +133,11 @@ void RunAssess(const AssessOptions& options) {
     const std::optional<model::ObjectModel> object = store.Load(name);
     if (!object) throw std::runtime_error(options.store + ": object '" + name + "' was removed meanwhile");
     if (object->views.empty()) throw std::runtime_error(options.store + ": object '" + name + "' has no views; learn it again");
+    auto backgrounds = BackgroundsFor(*object, options.backgrounds, store);
     const std::vector<assessment::Trial> trials =
-        TrialsOf(options, *object, options.backgrounds.empty() ? OwnBackgrounds(*object) : backgrounds, params);
+        options.images > 0
+            ? KeptObjectTrials(options.store + ".trials", *object, options.backgrounds, &backgrounds, options.images, params)
+            : RunObjectTrials(*object, &backgrounds, params);
     const measures::Measures fitted = assessment::FitMeasures(trials, params.recogniser, params.trials.observed_fit);
     const std::vector<measures::WeightedViewpoint> directions =
         assessment::UniformViewpoints(params.candidates.min_elevation_rad, params.candidates.max_elevation_rad,
@@ -229,6 +149,75 @@ void RunAssess(const AssessOptions& options) {
             << fitted.predicted.HalfwayRotation() * 180.0 / M_PI << " degrees (" << trials.size() << " virtual views)\n";
   }
   WriteResult(options.common, result, summary.str());
+}
+
+// Photographs of one of the objects, with truth.
+ReportTruth PhotographsOf(const AssessOptions& options, const model::ObjectModel& object, const params::LibraryParams& params) {
+  const rgbd::BopScene scene(options.sequence);
+  const RecordedObject known(scene, options.object_id);
+  ReportTruth result;
+  result.object = object.name;
+  result.sequence = options.sequence;
+  assessment::Truth truth;
+  truth.T_mesh_object = MeshFromObject(scene, options.object_id, object);
+  truth.points_in_mesh = truth.T_mesh_object * object.PointMatrix();
+  truth.correct_m = params.trials.correct_m;
+  for (const int id : FramesOf(scene, options.frames)) {
+    const bool learned =
+        std::any_of(object.views.begin(), object.views.end(), [id](const auto& view) { return view.frame_id == id; });
+    if (learned) {
+      throw std::runtime_error(options.store + ": '" + object.name + "' was learned from frame " + std::to_string(id) +
+                               ", which judges; learn it with --frames even, or give other --frames");
+    }
+    result.frames.push_back(HoldOut(known.Load(id), known.TruePose(id), truth));
+  }
+  FindFeatures(params.recogniser, &result.frames);
+  result.hypotheses =
+      assessment::Hypotheses(std::make_shared<const model::ObjectModel>(object), truth, result.frames, params.recogniser);
+  result.view_trials = assessment::TryViewsAlone(object, truth, result.frames, params.recogniser);
+  return result;
+}
+
+// Trials of every object at even levels of noise and blur, kept in the folder; the store stays as it is.
+void RunReport(const AssessOptions& options) {
+  CheckOutput(options.common);
+  params::LibraryParams params = LoadParams(options.common);
+  params.trials.level_ratio = 1.0;
+  const model::Store store(options.store, model::Store::Mode::kRead);
+  const std::filesystem::path folder = options.report;
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed) throw std::runtime_error(options.report + ": cannot be made: " + failed.message());
+  Report report;
+  report.recogniser = params.recogniser;
+  for (const std::string& name : NamesToAssess(options, store)) {
+    const std::optional<model::ObjectModel> object = store.Load(name);
+    if (!object || object->views.empty()) continue;
+    auto backgrounds = BackgroundsFor(*object, options.backgrounds, store);
+    ReportObject of;
+    of.name = name;
+    of.views = static_cast<int>(object->views.size());
+    of.trials = KeptObjectTrials((folder / "trials").string(), *object, options.backgrounds, &backgrounds,
+                                 options.images > 0 ? options.images : kReportImages, params);
+    of.measures = assessment::FitMeasures(of.trials, params.recogniser, params.trials.observed_fit);
+    report.objects.push_back(std::move(of));
+  }
+  if (report.objects.empty()) throw std::runtime_error(options.store + ": no object has views; learn one with vantage learn");
+  if (!options.sequence.empty()) {
+    const std::string name = options.truth_object.empty() ? report.objects.front().name : options.truth_object;
+    const std::optional<model::ObjectModel> object = store.Load(name);
+    if (!object) throw std::runtime_error(options.store + ": no object '" + name + "'; see vantage models list");
+    report.truth = PhotographsOf(options, *object, params);
+  }
+  const std::vector<Observation> observations = Observe(report);
+  SaveReport(report, observations, options.report);
+  std::ostringstream summary;
+  for (const Observation& one : observations) {
+    summary << (one.agrees ? "agrees   " : "differs  ") << (one.object.empty() ? "" : one.object + ": ") << one.claim << " -- "
+            << one.seen << '\n';
+  }
+  summary << (folder / "index.html").string() << '\n';
+  WriteResult(options.common, {{"observations", ToJson(observations)}}, summary.str());
 }
 
 }  // namespace
@@ -263,9 +252,34 @@ void AddAssess(CLI::App& app, Run& run) {
       ->expected(3)
       ->needs(predict)
       ->type_name("X,Y,Z");
+  CLI::Option* report =
+      verb->add_option(
+              "--report", options->report,
+              "Save no measures; write DIR/index.html: the paper's plots and observations for these objects, from 1000 virtual "
+              "images of each (or --images) at even levels of noise and blur, which are kept in DIR/trials")
+          ->excludes(predict)
+          ->type_name("DIR");
+  CLI::Option* sequence =
+      verb->add_option("--sequence", options->sequence, "With photographs of one of the objects: BOP scene folder with its truth")
+          ->needs(report)
+          ->type_name("DIR");
+  CLI::Option* object_id = verb->add_option("--object-id", options->object_id, "The object of its scene_gt.json")
+                               ->needs(sequence)
+                               ->check(CLI::Range(1, 1000000))
+                               ->type_name("N");
+  sequence->needs(object_id);
+  verb->add_option("--truth-object", options->truth_object, "Its name in the store (default: the first)")
+      ->needs(sequence)
+      ->type_name("NAME");
+  verb->add_option("--frames", options->frames, "Frames that judge: all, even, odd, or A:B")
+      ->needs(sequence)
+      ->capture_default_str();
   verb->callback([options, &run] {
     if (!options->predict.empty() && options->from.size() != 3) throw CLI::ValidationError("--predict", "needs --from X,Y,Z");
-    run = [options] { options->predict.empty() ? RunAssess(*options) : RunPredict(*options); };
+    run = [options] {
+      if (!options->report.empty()) return RunReport(*options);
+      options->predict.empty() ? RunAssess(*options) : RunPredict(*options);
+    };
   });
 }
 

@@ -109,15 +109,21 @@ Json CrossingFigures(const Models& models) {
 
 Json CompletenessFigures(const Models& models) {
   Json figures;
-  figures["detection_rate"] = Mean(models, [](const JudgedModel& model) { return model.detection_rate; });
-  for (std::size_t i = 0; i < kCompletenessRules.size(); ++i) {
-    const auto difference = [i](const JudgedModel& model) { return model.completeness[i] - model.detection_rate; };
+  figures["detection_rate"] = Mean(models, [](const JudgedModel& model) { return model.DetectionRate(); });
+  for (const measures::CompletenessRule rule : measures::kCompletenessRules) {
+    const auto difference = [rule](const JudgedModel& model) { return model.Completeness(rule) - model.DetectionRate(); };
     const double mean = Mean(models, difference);
     const double variance = Mean(models, [&](const JudgedModel& model) { return std::pow(difference(model) - mean, 2); });
-    figures[measures::ToString(kCompletenessRules[i])] = {
-        {"predicted", Mean(models, [i](const JudgedModel& model) { return model.completeness[i]; })},
+    std::vector<measures::Forecast> forecasts;
+    for (const JudgedModel* model : models) {
+      const double share = model->measures.predicted.common_cause();
+      for (const auto& look : model->looks) forecasts.push_back({look.predicted.Value(rule, share), look.detected});
+    }
+    figures[measures::ToString(rule)] = {
+        {"predicted", Mean(models, [rule](const auto& model) { return model.Completeness(rule); })},
         {"difference", mean},
-        {"difference_sd", std::sqrt(variance)}};
+        {"difference_sd", std::sqrt(variance)},
+        {"brier_score", measures::BrierScore(forecasts)}};
   }
   return figures;
 }
@@ -178,13 +184,16 @@ std::string TrialTable(const CalibrationTrial& trial) {
 
 std::string ModelTable(const CalibrationTrial& trial) {
   std::ostringstream text;
-  text << "views,draw,right_mean,right_sigma,wrong_mean,wrong_sigma,halfway_deg,detection_rate,max,noisy_or,clipped_sum\n";
+  text << "views,draw,right_mean,right_sigma,wrong_mean,wrong_sigma,halfway_deg,common_cause,detection_rate";
+  for (const auto rule : measures::kCompletenessRules) text << ',' << measures::ToString(rule);
+  text << "\n";
   for (const JudgedModel& model : trial.models) {
     const measures::ObservedSuccess& observed = model.measures.observed;
     text << model.views << ',' << model.draw << ',' << observed.positive().mean << ',' << observed.positive().sigma << ','
          << observed.negative().mean << ',' << observed.negative().sigma << ','
-         << model.measures.predicted.HalfwayRotation() / kDegree << ',' << model.detection_rate;
-    for (const double completeness : model.completeness) text << ',' << completeness;
+         << model.measures.predicted.HalfwayRotation() / kDegree << ',' << model.measures.predicted.common_cause() << ','
+         << model.DetectionRate();
+    for (const auto rule : measures::kCompletenessRules) text << ',' << model.Completeness(rule);
     text << '\n';
   }
   return text.str();
@@ -285,18 +294,27 @@ std::string TableOf(const Json& figures) {
   forecasts("p(o|c), prior 1/2", pooled["observed_prior_half"]);
   forecasts("p(o|theta)", pooled["predicted"]);
   text +=
-      "views  hypotheses  right  Brier  cal.err   halved at: virtual  real   detected   max       noisy_or  clipped_sum (predicted "
-      "- detected)\n";
+      "                                        halves at, deg             completeness - detected, Brier score of single looks\n";
+  text += "views  hypotheses  right  Brier  cal.err   virtual   real  detected ";
+  for (const auto rule : measures::kCompletenessRules) {
+    std::snprintf(line, sizeof line, " %13s", measures::ToString(rule).c_str());
+    text += line;
+  }
+  text += '\n';
   const auto row = [&](const std::string& name, const Json& of) {
     const Json& observed = of["observed"];
     const Json& completeness = of["completeness"];
-    std::snprintf(line, sizeof line, "%-6s %10d %6d %6.3f %8.3f %18.1f %6.1f %10.3f %+8.3f %+10.3f %+10.3f\n", name.c_str(),
-                  observed["count"].get<int>(), observed["right"].get<int>(), observed["brier_score"].get<double>(),
-                  observed["calibration_error"].get<double>(), of["crossing"]["virtual_deg"].get<double>(),
-                  of["crossing"]["real_deg"].get<double>(), completeness["detection_rate"].get<double>(),
-                  completeness["max"]["difference"].get<double>(), completeness["noisy_or"]["difference"].get<double>(),
-                  completeness["clipped_sum"]["difference"].get<double>());
+    std::snprintf(line, sizeof line, "%-6s %10d %6d %6.3f %8.3f %9.1f %6.1f %9.3f ", name.c_str(), observed["count"].get<int>(),
+                  observed["right"].get<int>(), observed["brier_score"].get<double>(), observed["calibration_error"].get<double>(),
+                  of["crossing"]["virtual_deg"].get<double>(), of["crossing"]["real_deg"].get<double>(),
+                  completeness["detection_rate"].get<double>());
     text += line;
+    for (const auto rule : measures::kCompletenessRules) {
+      const Json& by_rule = completeness[measures::ToString(rule)];
+      std::snprintf(line, sizeof line, "  %+6.3f %.3f", by_rule["difference"].get<double>(), by_rule["brier_score"].get<double>());
+      text += line;
+    }
+    text += '\n';
   };
   for (const Json& entry : figures["per_views"]) row(std::to_string(entry["views"].get<int>()), entry);
   row("all", pooled);

@@ -9,7 +9,7 @@
 
 #include "assessment/background.h"
 #include "model/store.h"
-#include "session/judge.h"
+#include "vantage/held_out_frames.h"
 #include "vantage/known_views.h"
 #include "vantage/sequence.h"
 #include "vantage/truth_judge.h"
@@ -17,7 +17,6 @@
 namespace vantage::cli {
 namespace {
 
-constexpr double kMinShareInImage = 0.5;
 constexpr int kMaxBackgrounds = 8;  // As the assessor keeps.
 constexpr int kMinTrialsPerView = 8;
 constexpr int kSimulatedFrames = 96;
@@ -69,24 +68,17 @@ class Field {
   // Frames that judge, then those without the object.
   std::vector<assessment::HeldOutFrame> HeldOut() const {
     std::vector<assessment::HeldOutFrame> frames;
-    for (const int id : judged_ids_) frames.push_back(WithoutDepth(known_->Load(id), known_->TruePose(id)));
+    for (const int id : judged_ids_) frames.push_back(HoldOut(known_->Load(id), known_->TruePose(id), truth_));
     for (std::size_t i = 0; simulated_ && i < judged_ids_.size(); i += static_cast<std::size_t>(options_.absent_step)) {
-      frames.push_back(WithoutDepth(simulated_->Without(judged_ids_[i]), std::nullopt));
+      frames.push_back(HoldOut(simulated_->Without(judged_ids_[i]), std::nullopt, truth_));
     }
     for (const std::string& folder : options_.absent) {
       const rgbd::BopScene absent(folder);
       for (std::size_t i = 0; i < absent.ids().size(); i += static_cast<std::size_t>(options_.absent_step)) {
-        frames.push_back(WithoutDepth(absent.Load(absent.ids()[i]), std::nullopt));
+        frames.push_back(HoldOut(absent.Load(absent.ids()[i]), std::nullopt, truth_));
       }
     }
-    const recognition::Recogniser recogniser(params_.recogniser);
-    cv::parallel_for_(cv::Range(0, static_cast<int>(frames.size())), [&](const cv::Range& range) {
-      for (int i = range.start; i < range.end; ++i) {
-        auto& [frame, features, T_camera_mesh, counts] = frames[static_cast<std::size_t>(i)];
-        features = recogniser.Extract(frame);
-        frame.color = cv::Mat();
-      }
-    });
+    FindFeatures(params_.recogniser, &frames);
     return frames;
   }
 
@@ -100,28 +92,17 @@ class Field {
   }
 
   // Frames to learn from with the object masked, as the assessor keeps them of its run.
-  std::vector<cv::Mat> Backgrounds(std::mt19937* random) const {
+  std::vector<assessment::Background> Backgrounds(std::mt19937* random) const {
     const int count = std::min(kMaxBackgrounds, static_cast<int>(learned_ids_.size()));
-    std::vector<cv::Mat> images;
+    std::vector<assessment::Background> images;
     for (const int i : Draw(count, static_cast<int>(learned_ids_.size()), random)) {
       const int id = learned_ids_[static_cast<std::size_t>(i)];
-      images.push_back(assessment::MaskedBackground(known_->Load(id).color, known_->Mask(id)));
+      images.push_back({assessment::MaskedBackground(known_->Load(id).color, known_->Mask(id)), nullptr});
     }
     return images;
   }
 
  private:
-  assessment::HeldOutFrame WithoutDepth(rgbd::Frame frame, const std::optional<geometry::Rigid>& T_camera_mesh) const {
-    assessment::HeldOutFrame held_out;
-    held_out.frame = std::move(frame);
-    held_out.frame.depth = cv::Mat();
-    held_out.frame.T_world_camera.reset();
-    held_out.T_camera_mesh = T_camera_mesh;
-    held_out.counts =
-        T_camera_mesh && session::ShareInImage(truth_.points_in_mesh, *T_camera_mesh, held_out.frame.camera) >= kMinShareInImage;
-    return held_out;
-  }
-
   const CalibrationOptions& options_;
   const params::LibraryParams& params_;
   std::unique_ptr<rgbd::BopScene> scene_;  // Of a recording.
@@ -144,12 +125,7 @@ void Judge(const model::ObjectModel& object, const Field& field, const std::vect
   judged->measures = object.measures;
   judged->hypotheses =
       assessment::Hypotheses(std::make_shared<const model::ObjectModel>(object), field.truth(), frames, params.recogniser);
-  judged->detection_rate = assessment::DetectionRate(judged->hypotheses, frames, object.measures.observed);
-  const auto viewpoints = assessment::ViewpointsOf(frames, field.truth());
-  for (std::size_t i = 0; i < kCompletenessRules.size(); ++i) {
-    judged->completeness[i] =
-        measures::Completeness(object.viewpoints(), viewpoints, object.measures.predicted, kCompletenessRules[i]);
-  }
+  judged->looks = assessment::Looks(object, judged->hypotheses, frames, field.truth());
 }
 
 // Models drawn from all learned views, assessed by virtual views alone and judged.
@@ -197,7 +173,8 @@ class DrawnModels {
     assessment::TrialParams trials = TrialsFor(params_.trials, judged.views, options_.max_trials);
     trials.seed = options_.seed + static_cast<std::uint32_t>(i);
     std::mt19937 random(trials.seed);
-    judged.trials = assessment::RunTrials(object, 0, field_.Backgrounds(&random), params_.recogniser, trials);
+    auto backgrounds = field_.Backgrounds(&random);
+    judged.trials = assessment::RunTrials(object, 0, &backgrounds, params_.recogniser, trials);
     object.measures = assessment::FitMeasures(judged.trials, params_.recogniser, trials.observed_fit);
     for (const assessment::ViewTrial& trial : alone_) {
       if (std::binary_search(chosen_[i].begin(), chosen_[i].end(), trial.view)) judged.view_trials.push_back(trial);
@@ -233,6 +210,18 @@ JudgedModel JudgeStored(const CalibrationOptions& options, const params::Library
 }
 
 }  // namespace
+
+double JudgedModel::DetectionRate() const {
+  double detected = 0.0;
+  for (const measures::JointSample& look : looks) detected += look.detected;
+  return looks.empty() ? 0.0 : detected / static_cast<double>(looks.size());
+}
+
+double JudgedModel::Completeness(measures::CompletenessRule rule) const {
+  double sum = 0.0;
+  for (const measures::JointSample& look : looks) sum += look.predicted.Value(rule, measures.predicted.common_cause());
+  return looks.empty() ? 0.0 : sum / static_cast<double>(looks.size());
+}
 
 CalibrationTrial TryCalibration(const CalibrationOptions& options, const params::LibraryParams& params,
                                 const std::function<void(int done, int of)>& progress) {

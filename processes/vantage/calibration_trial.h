@@ -1,7 +1,6 @@
 // Measures learned from virtual views, held against frames of the same recording that nothing was learned from.
 #pragma once
 
-#include <array>
 #include <functional>
 #include <optional>
 #include <string>
@@ -14,9 +13,6 @@
 #include "vantage/verb.h"
 
 namespace vantage::cli {
-
-constexpr std::array kCompletenessRules = {measures::CompletenessRule::kMax, measures::CompletenessRule::kNoisyOr,
-                                           measures::CompletenessRule::kClippedSum};
 
 struct CalibrationOptions {
   std::string folder;  // A recording...
@@ -40,8 +36,10 @@ struct JudgedModel {
   std::vector<assessment::Trial> trials;                  // Virtual; none where the measures were stored.
   std::vector<assessment::HeldOutHypothesis> hypotheses;  // By frame.
   std::vector<assessment::ViewTrial> view_trials;         // Its views, each offered alone.
-  std::array<double, kCompletenessRules.size()> completeness{};
-  double detection_rate = 0.0;
+  std::vector<measures::JointSample> looks;               // Frames in which it should be detected.
+
+  double DetectionRate() const;
+  double Completeness(measures::CompletenessRule rule) const;  // Predicted for the directions and distances of these frames.
 };
 
 struct CalibrationTrial {

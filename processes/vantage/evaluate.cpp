@@ -10,10 +10,12 @@ void AddEvaluate(CLI::App& app, Run& run) {
   verb->require_subcommand(1);
   verb->set_version_flag("--version", "vantage " VANTAGE_VERSION);
   AddEvaluateCalibration(*verb, run);
+  AddEvaluateCompleteness(*verb, run);
   AddEvaluateFeatures(*verb, run);
   AddEvaluateLearner(*verb, run);
   AddEvaluateRecogniser(*verb, run);
   AddEvaluateSegmentation(*verb, run);
+  AddEvaluateUpdate(*verb, run);
 }
 
 }  // namespace vantage::cli

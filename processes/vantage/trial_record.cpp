@@ -1,6 +1,7 @@
 #include "vantage/trial_record.h"
 
 #include <fstream>
+#include <limits>
 #include <stdexcept>
 
 #include "vantage/verb.h"
@@ -10,19 +11,36 @@ namespace {
 
 Json ToJson(const std::vector<assessment::Proposal>& proposals) {
   Json json = Json::array();
-  for (const assessment::Proposal& proposal : proposals) json.push_back({proposal.confidence, proposal.correct});
+  for (const assessment::Proposal& proposal : proposals) {
+    json.push_back({proposal.confidence, proposal.correct, Number(proposal.error_m)});
+  }
   return json;
 }
 
 std::vector<assessment::Proposal> ProposalsFrom(const Json& json) {
   std::vector<assessment::Proposal> proposals;
-  for (const Json& one : json) proposals.push_back({one.at(0).get<double>(), one.at(1).get<bool>()});
+  for (const Json& one : json) {
+    const double error_m = one.at(2).is_null() ? std::numeric_limits<double>::infinity() : one.at(2).get<double>();
+    proposals.push_back({one.at(0).get<double>(), one.at(1).get<bool>(), error_m});
+  }
   return proposals;
 }
 
+Json ToJson(const std::vector<assessment::Displacement>& displacements) {
+  Json json = Json::array();
+  for (const assessment::Displacement& one : displacements) json.push_back({one.rotation_rad, one.log2_scale});
+  return json;
+}
+
+std::vector<assessment::Displacement> DisplacementsFrom(const Json& json) {
+  std::vector<assessment::Displacement> displacements;
+  for (const Json& one : json) displacements.push_back({one.at(0).get<double>(), one.at(1).get<double>()});
+  return displacements;
+}
+
 Json ToJson(const assessment::Trial& trial) {
-  return {trial.view,        trial.object_shown, trial.rotation_rad,  trial.log2_scale,
-          trial.image_noise, trial.blur_px,      ToJson(trial.alone), ToJson(trial.together)};
+  return {trial.view,    trial.object_shown,  trial.rotation_rad,     trial.log2_scale,    trial.image_noise,
+          trial.blur_px, ToJson(trial.alone), ToJson(trial.together), ToJson(trial.others)};
 }
 
 assessment::Trial TrialFrom(const Json& json) {
@@ -35,6 +53,7 @@ assessment::Trial TrialFrom(const Json& json) {
   trial.blur_px = json.at(5).get<double>();
   trial.alone = ProposalsFrom(json.at(6));
   trial.together = ProposalsFrom(json.at(7));
+  trial.others = DisplacementsFrom(json.at(8));
   return trial;
 }
 

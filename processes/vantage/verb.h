@@ -35,10 +35,12 @@ void AddModels(CLI::App& app, Run& run);
 void AddEvaluate(CLI::App& app, Run& run);
 // The parts of `evaluate`.
 void AddEvaluateCalibration(CLI::App& evaluate, Run& run);
+void AddEvaluateCompleteness(CLI::App& evaluate, Run& run);
 void AddEvaluateFeatures(CLI::App& evaluate, Run& run);
 void AddEvaluateLearner(CLI::App& evaluate, Run& run);
 void AddEvaluateRecogniser(CLI::App& evaluate, Run& run);
 void AddEvaluateSegmentation(CLI::App& evaluate, Run& run);
+void AddEvaluateUpdate(CLI::App& evaluate, Run& run);
 void AddCalibrate(CLI::App& app, Run& run);
 void AddTruth(CLI::App& app, Run& run);
 void AddVocabulary(CLI::App& app, Run& run);

@@ -81,6 +81,19 @@ TEST(FitMeasures, ConfidenceIsThatOfWholeModelsPredictionThatOfViewsAlone) {
   EXPECT_LE(measures.predicted.HalfwayRotation(), before.predicted.HalfwayRotation() + 1e-9);
 }
 
+TEST(FitMeasures, WhatViewsDoTogetherTellsHowFarTheyFailTogether) {
+  std::vector<Trial> trials = MadeUpTrials(400);
+  for (Trial& trial : trials) {
+    if (trial.object_shown) trial.others = {{trial.rotation_rad, trial.log2_scale}};
+  }
+  const double together = FitMeasures(trials, {}).predicted.common_cause();  // Two views do no better than one.
+  EXPECT_GT(together, 0.8);
+  for (Trial& trial : trials) {
+    if (trial.object_shown && trial.rotation_rad < 45.0 * kDegree) trial.together.assign(1, {0.6, true});
+  }
+  EXPECT_LT(FitMeasures(trials, {}).predicted.common_cause(), together - 0.3);
+}
+
 TEST(FitMeasures, NoTrialsGiveTheDefault) {
   const measures::Measures measures = FitMeasures({}, {});
   EXPECT_EQ(measures.observed.source(), measures::Source::kDefault);

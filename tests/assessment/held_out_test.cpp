@@ -32,29 +32,37 @@ TEST(Truth, RightIsNearTheTruePoseInTheObjectsOwnFrame) {
   EXPECT_FALSE(truth.IsRight(T_camera_object, HeldOutFrame()));  // Whatever is found where the object is not is wrong.
 }
 
-TEST(DetectionRate, CountsFramesWhoseMostLikelyHypothesisIsRightAndBelieved) {
+TEST(Truth, TheErrorIsByAxisOfTheCamera) {
+  Truth truth;
+  truth.points_in_mesh = Eigen::Matrix3Xd::Random(3, 40) * 0.1;
+  truth.T_mesh_object = geometry::Rigid(Eigen::Translation3d(0.5, 0.0, 0.0));
+  const HeldOutFrame frame = FrameAt(1.0);
+  const geometry::Rigid T_camera_object = Eigen::Translation3d(0.01, -0.02, 0.03) * *frame.T_camera_mesh * truth.T_mesh_object;
+  EXPECT_LT((truth.ErrorByAxis(T_camera_object, frame) - Eigen::Vector3d(0.01, 0.02, 0.03)).norm(), 1e-9);
+  EXPECT_THROW(truth.ErrorByAxis(T_camera_object, HeldOutFrame()), std::logic_error);
+}
+
+TEST(Looks, AreTheFramesThatCountDetectedWhereTheMostLikelyHypothesisIsRightAndBelieved) {
   std::vector<HeldOutFrame> frames(5, FrameAt(1.0));
+  frames[1] = FrameAt(0.5);
   frames[4].counts = false;
-  const measures::ObservedSuccess observed({0.6, 0.1, 50}, {0.2, 0.1, 50}, measures::Source::kOwn);  // 1/2 at 0.4.
+  model::ObjectModel object;
+  object.views.emplace_back();
+  object.views[0].T_camera_object = *frames[0].T_camera_mesh;
+  object.measures.observed = {{0.6, 0.1, 50}, {0.2, 0.1, 50}, measures::Source::kOwn};  // 1/2 at 0.4.
   const std::vector<HeldOutHypothesis> hypotheses = {
       {0, 0.7, true},                   // Detected.
       {1, 0.3, true},                   // Right, not believed.
       {2, 0.8, false}, {2, 0.7, true},  // The wrong one is the more likely.
       {4, 0.7, true},                   // Does not count; frame 3 has none.
   };
-  EXPECT_DOUBLE_EQ(DetectionRate(hypotheses, frames, observed), 0.25);
-  EXPECT_EQ(DetectionRate({}, frames, observed), 0.0);
-  EXPECT_EQ(DetectionRate({}, {}, observed), 0.0);
-}
-
-TEST(ViewpointsOf, AreThoseOfTheFramesThatCount) {
-  Truth truth;
-  std::vector<HeldOutFrame> frames = {FrameAt(1.0), FrameAt(0.5), HeldOutFrame()};
-  frames[0].counts = false;
-  const auto viewpoints = ViewpointsOf(frames, truth);
-  ASSERT_EQ(viewpoints.size(), 1u);
-  EXPECT_NEAR(viewpoints[0].viewpoint.distance_m, 0.5, 1e-12);
-  EXPECT_NEAR(geometry::AngleBetween(viewpoints[0].viewpoint.direction, -Eigen::Vector3d::UnitZ()), 0.0, 1e-9);
+  const auto looks = Looks(object, hypotheses, frames, Truth());
+  ASSERT_EQ(looks.size(), 4u);
+  for (std::size_t i = 0; i < looks.size(); ++i) EXPECT_EQ(looks[i].detected, i == 0);
+  const auto max = [&](std::size_t i) { return looks[i].predicted.Value(measures::CompletenessRule::kMax, 0.5); };
+  EXPECT_NEAR(max(0), object.measures.predicted.Probability(0.0), 1e-9);
+  EXPECT_NEAR(max(1), object.measures.predicted.Probability(0.0, 1.0), 1e-9);
+  EXPECT_TRUE(Looks(object, {}, {}, Truth()).empty());
 }
 
 TEST(HeldOut, ViewsOfTheBoxAreFoundInPhotographsBesideThemAndNotFromBehind) {

@@ -37,8 +37,7 @@ TEST(Planner, EveryCandidateCarriesItsOwnReasons) {
   TestMount mount;
   mount.unreachable = [](const geometry::Rigid& pose) { return pose.translation().y() > 0.25 ? "in collision" : ""; };
   mount.no_path = [](const geometry::Rigid& pose) { return pose.translation().y() > 0.2 ? "no path found" : ""; };
-  for (const auto rule :
-       {measures::CompletenessRule::kMax, measures::CompletenessRule::kNoisyOr, measures::CompletenessRule::kClippedSum}) {
+  for (const auto rule : measures::kCompletenessRules) {
     SCOPED_TRACE(ToString(rule));
     PlannerParams params;
     params.worth_s = 600.0;

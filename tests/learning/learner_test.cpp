@@ -150,6 +150,22 @@ TEST(Learner, AnObjectMetBeforeIsContinuedAndHasNoTwin) {
   EXPECT_EQ(second.object()->views[0].utime, first.object()->views[0].utime);
 }
 
+TEST(Learner, ANewObjectIsJudgedByWhatHoldsForOthersUntilItHasItsOwn) {
+  VANTAGE_NEEDS_DATA("shelf_box");
+  const LearnerParams params;
+  auto other = std::make_shared<model::ObjectModel>();
+  other->name = "other";
+  other->feature_fingerprint = params.recogniser.features.Fingerprint();
+  other->measures.observed = {{0.5, 0.1, 100}, {0.1, 0.05, 100}, measures::Source::kOwn};
+  other->measures.fingerprint = params.recogniser.Fingerprint();
+  Learner learner(params, "carton");
+  learner.SetOthers({other});
+  learner.Process(WithoutPose(ShelfFrames(1)[0]));
+  ASSERT_NE(learner.object(), nullptr);
+  EXPECT_EQ(learner.object()->measures.observed.source(), measures::Source::kPooled);
+  EXPECT_NEAR(learner.object()->measures.observed.positive().mean, 0.5, 1e-9);
+}
+
 // What was found again by recognition alone is learned from only when it is sure, or the next frames have confirmed it.
 TEST(Learner, ConfirmsWhatItFoundAgainBeforeItLearns) {
   VANTAGE_NEEDS_DATA("shelf_box");

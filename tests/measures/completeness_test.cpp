@@ -31,13 +31,14 @@ TEST(Completeness, TheRulesAreOrderedAndProbabilities) {
   const auto queries = WholeSphere();
   for (int count : {1, 5, 30, 200}) {
     const auto views = RandomViews(count, static_cast<std::uint32_t>(count));
-    const double largest = Completeness(views, queries, predicted, CompletenessRule::kMax);
-    const double noisy_or = Completeness(views, queries, predicted, CompletenessRule::kNoisyOr);
-    const double clipped = Completeness(views, queries, predicted, CompletenessRule::kClippedSum);
-    EXPECT_GT(largest, 0.0);
-    EXPECT_LE(largest, noisy_or + 1e-12);
-    EXPECT_LE(noisy_or, clipped + 1e-12);
-    EXPECT_LE(clipped, 1.0);
+    double last = 0.0;
+    for (const CompletenessRule rule : kCompletenessRules) {  // In this order.
+      const double now = Completeness(views, queries, predicted, rule);
+      EXPECT_GT(now, 0.0);
+      EXPECT_GE(now, last - 1e-12) << ToString(rule);
+      EXPECT_LE(now, 1.0);
+      last = now;
+    }
   }
 }
 
@@ -51,7 +52,7 @@ TEST(Completeness, AViewNeverMakesTheModelLessComplete) {
   const PredictedSuccess predicted;
   const auto queries = WholeSphere();
   const auto all = RandomViews(25, 9);
-  for (CompletenessRule rule : {CompletenessRule::kMax, CompletenessRule::kNoisyOr, CompletenessRule::kClippedSum}) {
+  for (const CompletenessRule rule : kCompletenessRules) {
     std::vector<Viewpoint> views;
     double last = 0.0;
     for (const Viewpoint& view : all) {
@@ -83,8 +84,41 @@ TEST(Completeness, DistanceCountsAsScale) {
   EXPECT_THROW(DetectionProbability({learned}, {Eigen::Vector3d::UnitZ(), 0.0}, predicted), std::invalid_argument);
 }
 
+TEST(CommonCause, IsFoundInWhatViewsDidTogether) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> uniform;
+  for (const double share : {0.1, 0.5, 0.9}) {
+    std::vector<JointSample> samples;
+    for (int i = 0; i < 30000; ++i) {
+      const double p = uniform(random), q = uniform(random);
+      const bool together = uniform(random) < share;  // One cause for both, or one for each.
+      const double cause = uniform(random);
+      samples.emplace_back();
+      samples.back().predicted.Add(p);
+      samples.back().predicted.Add(q);
+      samples.back().detected = together ? cause < std::max(p, q) : cause < p || uniform(random) < q;
+    }
+    EXPECT_NEAR(FitCommonCause(samples), share, 0.08);
+  }
+  EXPECT_NEAR(FitCommonCause({}), PredictedSuccess::kDefaultCommonCause, 1e-9);
+}
+
+TEST(CommonCause, MakesTheRuleBetweenMaxAndNoisyOr) {
+  const auto views = RandomViews(12, 5);
+  const auto queries = WholeSphere();
+  PredictedSuccess predicted;
+  const auto by = [&](CompletenessRule rule) { return Completeness(views, queries, predicted, rule); };
+  predicted.set_common_cause(1.0);
+  EXPECT_NEAR(by(CompletenessRule::kCommonCause), by(CompletenessRule::kMax), 1e-12);
+  predicted.set_common_cause(0.0);
+  EXPECT_NEAR(by(CompletenessRule::kCommonCause), by(CompletenessRule::kNoisyOr), 1e-12);
+  predicted.set_common_cause(0.25);
+  EXPECT_NEAR(by(CompletenessRule::kCommonCause), 0.25 * by(CompletenessRule::kMax) + 0.75 * by(CompletenessRule::kNoisyOr), 1e-12);
+  EXPECT_THROW(predicted.set_common_cause(1.5), std::invalid_argument);
+}
+
 TEST(CompletenessRule, TextComesBack) {
-  for (CompletenessRule rule : {CompletenessRule::kMax, CompletenessRule::kNoisyOr, CompletenessRule::kClippedSum}) {
+  for (const CompletenessRule rule : kCompletenessRules) {
     EXPECT_EQ(CompletenessRuleFromString(ToString(rule)), rule);
   }
   EXPECT_THROW(CompletenessRuleFromString("sum"), std::invalid_argument);

@@ -11,6 +11,7 @@ Measures Fitted() {
   Measures measures;
   measures.observed = ObservedSuccess::Fit({{0.31, true}, {0.62, true}, {0.11, false}, {1.0 / 3.0, false}}, Source::kOwn);
   measures.predicted = PredictedSuccess::Fit({{0.1, 0.3, true}, {0.4, -0.7, false}, {0.9, 0.0, false}}, Source::kPooled, 3.0);
+  measures.predicted.set_common_cause(1.0 / 7.0);
   measures.fingerprint = "sift \"2000\" é";
   return measures;
 }
@@ -23,6 +24,7 @@ TEST(MeasuresText, ComesBackToTheLastBit) {
   EXPECT_EQ(after.predicted.source(), Source::kPooled);
   EXPECT_EQ(after.observed.positive().count, 2);
   EXPECT_EQ(after.predicted.trials(), 3);
+  EXPECT_EQ(after.predicted.common_cause(), before.predicted.common_cause());
   for (double x = 0.0; x <= 1.0; x += 0.01) {
     EXPECT_EQ(after.observed.Probability(x), before.observed.Probability(x));
     EXPECT_EQ(after.predicted.Probability(x, x - 0.5), before.predicted.Probability(x, x - 0.5));

@@ -435,6 +435,20 @@ TEST_F(Cli, AssessmentGoesOnWhereItWasStoppedAndPredicts) {
   EXPECT_LT(predict(1.0)["rotation_deg"], 0.1);
   EXPECT_EQ(predict(-1.0)["probability"], 0.0);
   EXPECT_EQ(predict(1.0)["source"], "own");
+  // The report, with photographs as truth; the second time nothing is tried again. The store stays as it is.
+  const std::string before = ReadFile(folder_ / "s.db");
+  const std::string report =
+      "assess --store s.db --report report --images 30 --sequence '" + data + "/ycbv' --object-id 9 --frames ";
+  outcome = Run(report + "2:6 --json report.json");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::string page = ReadFile(folder_ / "report" / "index.html");
+  EXPECT_NE(page.find("<td>" + name + "</td>"), std::string::npos);
+  EXPECT_NE(page.find("</html>"), std::string::npos);
+  const Json observations = Json::parse(ReadFile(folder_ / "report.json"))["observations"];
+  EXPECT_EQ(observations.size(), 11u);  // 6 of virtual images, 5 of photographs; one object alone cannot differ from others.
+  EXPECT_EQ(Run(report + "2:6").err, "");
+  ExpectRefused(report + "1:6", "vantage assess", {"learned from frame 1", "--frames"});
+  EXPECT_EQ(ReadFile(folder_ / "s.db"), before);
 }
 
 }  // namespace

@@ -44,6 +44,20 @@ def recognition(folder):
     check(truth, "wrong", truth["wrong"] == 0)
 
 
+def completeness():
+    """How views combine, on the photographs of `board`: the default rule says how often models of 1 to 16 views are detected."""
+    figures = vantage("evaluate", "completeness", "--sequence", DATA / "board", "--object-id", 3, "--quick")
+    rules = ("max", "common_cause", "noisy_or", "clipped_sum")
+    for of in figures["views"]:
+        default = of["common_cause"]
+        print(of["views"], "views:", of["detection_rate"], {rule: round(of[rule]["difference"], 3) for rule in rules}, flush=True)
+        check(default, "difference", abs(default["difference"]) <= 0.08)
+    check(figures, "views", len(figures["views"]) == 5)
+    best = min(rules, key=lambda rule: sum(of[rule]["brier_score"] for of in figures["views"]))
+    if best != "common_cause":
+        sys.exit(f"figures: single looks are foretold best by {best}, not by the default rule")
+
+
 def main():
     if not (DATA / "board").is_dir() or not (DATA / "shelf_box").is_dir():
         print(f"no board and shelf_box in {DATA}: set VANTAGE_DATA")
@@ -51,6 +65,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         tracking(Path(folder))
         recognition(Path(folder))
+    completeness()
 
 
 main()

@@ -1,0 +1,120 @@
+// vantage evaluate update: what the assessor process does after every new view, how long it takes on one core, and how far its
+// measures are from those of many more virtual images.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <iostream>
+#include <opencv2/core/utility.hpp>
+#include <sstream>
+
+#include "assessor/worker.h"
+#include "vantage/object_trials.h"
+#include "vantage/truth_judge.h"
+#include "vantage/verb.h"
+
+namespace vantage::cli {
+namespace {
+
+struct Options {
+  CommonOptions common;
+  std::string store;
+  int images = 10000;
+  bool quick = false;
+};
+
+struct Updates {
+  std::vector<double> cpu_s, wall_s;  // Of each view.
+  measures::Measures measures;        // After the last.
+};
+
+// View by view, as the views had come one after another.
+Updates Update(const std::string& store, const model::ObjectModel& object, const params::LibraryParams& params) {
+  assessor::WorkerParams worker_params;
+  worker_params.store = store;
+  worker_params.recogniser = params.recogniser;
+  worker_params.trials = params.trials;
+  worker_params.plane = params.learner.plane;
+  worker_params.clusters = params.learner.clusters;
+  assessor::Worker worker(worker_params);
+  Updates updates;
+  for (std::size_t view = 0; view < object.views.size(); ++view) {
+    const std::clock_t cpu = std::clock();
+    const auto wall = std::chrono::steady_clock::now();
+    worker.Start(object.name, object.views[view].keyframe);
+    worker.WaitUntilDone();
+    updates.cpu_s.push_back(static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
+    updates.wall_s.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count());
+    const auto assessed = worker.Poll();
+    if (!assessed || !assessed->error.empty()) throw std::runtime_error(store + ": " + (assessed ? assessed->error : "no result"));
+    updates.measures = assessed->measures;
+    std::cerr << "\rview " << view + 1 << " of " << object.views.size() << std::flush;
+  }
+  std::cerr << '\n';
+  return updates;
+}
+
+Json Seconds(const std::vector<double>& seconds) { return {{"median", Quantile(seconds, 0.5)}, {"max", Quantile(seconds, 1.0)}}; }
+
+void RunEvaluateUpdate(const Options& options) {
+  CheckOutput(options.common);
+  const params::LibraryParams params = LoadParams(options.common);
+  const model::ObjectModel object = OnlyObjectOf(options.store);
+  cv::setNumThreads(1);
+  const Updates updates = Update(options.store, object, params);
+  cv::setNumThreads(-1);
+  const model::Store store(options.store, model::Store::Mode::kRead);
+  auto backgrounds = BackgroundsFor(object, "", store);
+  const auto trials =
+      KeptObjectTrials(options.store + ".trials", object, "", &backgrounds, options.quick ? 400 : options.images, params);
+  const measures::Measures full = assessment::FitMeasures(trials, params.recogniser, params.trials.observed_fit);
+
+  const auto viewpoints = object.viewpoints();
+  const auto directions = assessment::UniformViewpoints(params.candidates.min_elevation_rad, params.candidates.max_elevation_rad,
+                                                        {assessment::MedianDistance(viewpoints)});
+  const auto completeness = [&](const measures::Measures& of) {
+    return measures::Completeness(viewpoints, directions, of.predicted, params.planner.rule);
+  };
+  double observed = 0.0;
+  for (double c = 0.0; c <= 1.0; c += 0.01) {
+    observed = std::max(observed, std::abs(updates.measures.observed.Probability(c) - full.observed.Probability(c)));
+  }
+  const Json result = {{"object", object.name},
+                       {"views", object.views.size()},
+                       {"cpu_s", Seconds(updates.cpu_s)},
+                       {"wall_s", Seconds(updates.wall_s)},
+                       {"images_full", trials.size()},
+                       {"completeness", completeness(updates.measures)},
+                       {"completeness_full", completeness(full)},
+                       {"observed_largest_difference", observed},
+                       {"halfway_deg", updates.measures.predicted.HalfwayRotation() * 180.0 / M_PI},
+                       {"halfway_full_deg", full.predicted.HalfwayRotation() * 180.0 / M_PI}};
+  std::ostringstream text;
+  text.precision(3);
+  text << object.name << ", " << object.views.size() << " views one after another: " << Quantile(updates.cpu_s, 0.5)
+       << " s of one core a view (at most " << Quantile(updates.cpu_s, 1.0) << "; wall " << Quantile(updates.wall_s, 0.5) << ", "
+       << Quantile(updates.wall_s, 1.0) << ")\ncompleteness " << completeness(updates.measures) << ", by " << trials.size()
+       << " virtual images " << completeness(full) << "; p(o|c) differs by " << observed << " at most; p(o|theta) halves at "
+       << updates.measures.predicted.HalfwayRotation() * 180.0 / M_PI << " and " << full.predicted.HalfwayRotation() * 180.0 / M_PI
+       << " degrees\n";
+  WriteResult(options.common, result, text.str());
+}
+
+}  // namespace
+
+void AddEvaluateUpdate(CLI::App& evaluate, Run& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* verb = evaluate.add_subcommand(
+      "update",
+      "The assessor's work after every new view: seconds of one core, and its measures beside those of --images virtual images");
+  AddCommonOptions(*verb, options->common);
+  verb->add_option("--store", options->store, "A store with one object")->required()->type_name("FILE");
+  verb->add_option("--images", options->images,
+                   "Virtual images of the full result, kept in FILE.trials as vantage assess keeps them")
+      ->check(CLI::Range(1, 10000000))
+      ->capture_default_str();
+  verb->add_flag("--quick", options->quick, "400 virtual images");
+  verb->callback([options, &run] { run = [options] { RunEvaluateUpdate(*options); }; });
+}
+
+}  // namespace vantage::cli
