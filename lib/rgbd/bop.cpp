@@ -125,6 +125,10 @@ cv::Mat ReadDepth(const fs::path& file, double depth_scale) {
 BopScene::BopScene(const fs::path& folder) : folder_(folder) {
   if (!fs::is_directory(folder)) Fail(folder, "expected a BOP scene folder, found no such folder; check the path");
   const fs::path camera_file = folder / "scene_camera.json";
+  if (!fs::exists(camera_file) && IsTumFolder(folder)) {
+    OpenTum();
+    return;
+  }
   const json cameras = ReadJson(camera_file);
   RequireObject(camera_file, cameras);
   for (const auto& [key, entry] : cameras.items()) {
@@ -163,6 +167,18 @@ BopScene::BopScene(const fs::path& folder) : folder_(folder) {
   }
 }
 
+void BopScene::OpenTum() {
+  CameraEntry entry;
+  entry.camera = ReadTumCamera(folder_);
+  entry.depth_scale = kTumDepthScale_mm;
+  for (TumFrame& frame : ReadTum(folder_)) {
+    entry.T_world_camera = frame.T_world_camera;
+    entry.tum = std::move(frame);
+    ids_.push_back(static_cast<int>(ids_.size()));
+    cameras_[ids_.back()] = entry;
+  }
+}
+
 Frame BopScene::Load(int id) const {
   const auto found = cameras_.find(id);
   if (found == cameras_.end())
@@ -171,14 +187,14 @@ Frame BopScene::Load(int id) const {
   const CameraEntry& entry = found->second;
   Frame frame;
   frame.id = id;
-  frame.utime = id * kFrameInterval_us;
+  frame.utime = entry.tum ? entry.tum->utime : id * kFrameInterval_us;
   frame.T_world_camera = entry.T_world_camera;
-  frame.color = ReadImage(ColorFile(folder_, id), cv::IMREAD_COLOR);
+  frame.color = ReadImage(entry.tum ? entry.tum->color : ColorFile(folder_, id), cv::IMREAD_COLOR);
   frame.camera = entry.camera;
   frame.camera.width = frame.color.cols;
   frame.camera.height = frame.color.rows;
-  if (fs::is_directory(folder_ / "depth")) {
-    const fs::path file = folder_ / "depth" / Name(id, ".png");
+  if (entry.tum || fs::is_directory(folder_ / "depth")) {
+    const fs::path file = entry.tum ? entry.tum->depth : folder_ / "depth" / Name(id, ".png");
     frame.depth = ReadDepth(file, entry.depth_scale);
     if (frame.depth.size() != frame.color.size())
       Fail(file, "expected depth as large as colour (" + Size(frame.color) + "), found " + Size(frame.depth) +

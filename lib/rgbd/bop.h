@@ -1,4 +1,5 @@
-// Recordings as BOP scene folders: rgb/, depth/, label/, scene_camera.json, scene_gt.json.
+// Recordings as BOP scene folders: rgb/, depth/, label/, scene_camera.json, scene_gt.json; folders of the TUM RGB-D benchmark are
+// taken as well (tum.h): their frames count from 0, and keep their times.
 #pragma once
 
 #include <filesystem>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "rgbd/frame.h"
+#include "rgbd/tum.h"
 
 namespace vantage::rgbd {
 
@@ -45,7 +47,10 @@ class BopScene {
     geometry::PinholeCamera camera;  // Width and height are 0 until an image was read.
     double depth_scale = 1.0;
     std::optional<geometry::Rigid> T_world_camera;
+    std::optional<TumFrame> tum;  // Of TUM folders: files and time.
   };
+
+  void OpenTum();
 
   std::filesystem::path folder_;
   std::vector<int> ids_;

@@ -31,6 +31,7 @@ Json ToJson(const FeatureSetting& setting, const FeatureFigures& figures) {
   result["wrong"] = figures.wrong;
   result["views"] = figures.views;
   result["view_points"] = figures.view_points;
+  if (!figures.coded_kb.empty()) result["coded_kb_median"] = Quantile(figures.coded_kb, 0.5);
   result["points_median"] = Number(Quantile(figures.points, 0.5));
   result["extract_ms_median"] = Number(Quantile(figures.extract_ms, 0.5));
   result["whole_ms_median"] = Number(Quantile(figures.whole_ms, 0.5));
@@ -40,11 +41,13 @@ Json ToJson(const FeatureSetting& setting, const FeatureFigures& figures) {
 }
 
 std::string RowOf(const FeatureSetting& setting, const FeatureFigures& figures) {
-  char line[200];
-  std::snprintf(line, sizeof line, "%-22s %6d %6d %6d %6d %6d %6d %7.0f %8.0f %8.0f %8.0f %8.0f\n", setting.name.c_str(),
+  char line[220];
+  char coded[30] = "";
+  if (!figures.coded_kb.empty()) std::snprintf(coded, sizeof coded, "  %.0f KB", Quantile(figures.coded_kb, 0.5));
+  std::snprintf(line, sizeof line, "%-22s %6d %6d %6d %6d %6d %6d %7.0f %8.0f %8.0f %8.0f %8.0f%s\n", setting.name.c_str(),
                 figures.frames, figures.found, figures.found_10mm, figures.right, figures.right_10mm, figures.wrong,
                 Quantile(figures.points, 0.5), Quantile(figures.extract_ms, 0.5), Quantile(figures.whole_ms, 0.5),
-                Quantile(figures.extract_cpu_ms, 0.5), Quantile(figures.whole_cpu_ms, 0.5));
+                Quantile(figures.extract_cpu_ms, 0.5), Quantile(figures.whole_cpu_ms, 0.5), coded);
   return line;
 }
 
@@ -98,7 +101,7 @@ void AddEvaluateFeatures(CLI::App& evaluate, Run& run) {
   verb->add_option("--features", options->settings, "What is compared, parted by commas")
       ->delimiter(',')
       ->capture_default_str()
-      ->type_name("TYPE:MAX_KEYPOINTS:CONTRAST[,...]");
+      ->type_name("TYPE:MAX_KEYPOINTS:CONTRAST[:JPEG_QUALITY][,...]");
   verb->add_flag("--quick", options->quick, "The first 8 frames only");
   verb->callback([options, &run] { run = [options] { RunEvaluateFeatures(*options); }; });
 }

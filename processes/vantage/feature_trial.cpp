@@ -1,11 +1,14 @@
 #include "vantage/feature_trial.h"
 
+#include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <cstdio>
 #include <ctime>
 #include <memory>
 #include <stdexcept>
 
+#include "rgbd/codec.h"
 #include "session/judge.h"
 #include "vantage/known_views.h"
 
@@ -58,16 +61,37 @@ std::vector<recognition::Detection> RecogniseTimed(const recognition::Recogniser
   return detections;
 }
 
+// The recording as it comes over the bus.
+class CodedObject : public RecordedObject {
+ public:
+  CodedObject(const RecordedObject& object, int jpeg_quality) : RecordedObject(object), jpeg_quality_(jpeg_quality) {}
+
+  rgbd::Frame Load(int id) const override { return Load(id, nullptr); }
+  rgbd::Frame Load(int id, std::vector<double>* coded_kb) const {
+    rgbd::Frame frame = RecordedObject::Load(id);
+    if (jpeg_quality_ == 0) return frame;
+    const rgbd::Bytes bytes = rgbd::EncodeColor(frame.color, jpeg_quality_);
+    if (coded_kb) coded_kb->push_back(1e-3 * static_cast<double>(bytes.size()));
+    frame.color = rgbd::DecodeColor(bytes);
+    return frame;
+  }
+
+ private:
+  int jpeg_quality_;
+};
+
 }  // namespace
 
 FeatureSetting ParseFeatureSetting(const std::string& text) {
   FeatureSetting setting;
   setting.name = text;
   char type[16] = "", rest[2] = "";
-  const int read = std::sscanf(text.c_str(), "%15[a-z]:%d:%lf%1s", type, &setting.features.max_keypoints,
-                               &setting.features.contrast_threshold, rest);
-  if (read != 3) {
-    throw std::runtime_error("--features: expected TYPE:MAX_KEYPOINTS:CONTRAST, as sift:3000:0.02; found " + text);
+  const int read = std::sscanf(text.c_str(), "%15[a-z]:%d:%lf:%d%1s", type, &setting.features.max_keypoints,
+                               &setting.features.contrast_threshold, &setting.jpeg_quality, rest);
+  const bool whole = read == 4 || (read == 3 && std::count(text.begin(), text.end(), ':') == 2 && std::isdigit(text.back()));
+  if (!whole || setting.jpeg_quality < 0 || setting.jpeg_quality > 100) {
+    throw std::runtime_error("--features: expected TYPE:MAX_KEYPOINTS:CONTRAST[:JPEG_QUALITY], as sift:3000:0.02:92; found " +
+                             text);
   }
   setting.features.type = type;
   setting.features.Check();
@@ -89,18 +113,19 @@ std::vector<FeatureFigures> TryFeatures(const rgbd::BopScene& scene, const std::
       params.features = settings[s].features;
       params.use_query_depth = false;
       recognisers.push_back(std::make_unique<recognition::Recogniser>(params));
-      auto object = std::make_shared<model::ObjectModel>(known.Learn(learned, params.features));
+      const CodedObject coded(known, settings[s].jpeg_quality);
+      auto object = std::make_shared<model::ObjectModel>(coded.Learn(learned, params.features));
       figures[s].views += static_cast<int>(object->views.size());
       for (const model::View& view : object->views) figures[s].view_points += view.features.size();
       if (!object->views.empty()) recognisers.back()->Set(object);
     }
     for (const int id : asked) {
-      rgbd::Frame frame = scene.Load(id);
-      frame.depth = cv::Mat();
-      frame.T_world_camera.reset();
       const auto truth = known.TruePose(id);
-      const bool visible = truth && session::ShareInImage(surface, *truth, frame.camera) >= kMinShareInImage;
       for (std::size_t s = 0; s < settings.size(); ++s) {
+        rgbd::Frame frame = CodedObject(known, settings[s].jpeg_quality).Load(id, &figures[s].coded_kb);
+        frame.depth = cv::Mat();
+        frame.T_world_camera.reset();
+        const bool visible = truth && session::ShareInImage(surface, *truth, frame.camera) >= kMinShareInImage;
         JudgeFrame(RecogniseTimed(*recognisers[s], frame, figures[s]), surface, truth, visible, figures[s]);
       }
     }

@@ -12,21 +12,23 @@ namespace vantage::cli {
 struct FeatureSetting {
   std::string name;
   features::FeatureParams features;
+  int jpeg_quality = 0;  // The images are coded as on the bus, those learned from and those asked about; 0: they are as they are.
 };
 
-// TYPE:MAX_KEYPOINTS:CONTRAST. Throws std::runtime_error with what was expected.
+// TYPE:MAX_KEYPOINTS:CONTRAST, and where wanted :JPEG_QUALITY. Throws std::runtime_error with what was expected.
 FeatureSetting ParseFeatureSetting(const std::string& text);
 
 struct FeatureFigures {
-  int frames = 0;              // In which at least half of the object's surface lies in the image.
-  int found = 0;               // ...with a pose less than 40 mm from the truth (mean point distance), whatever its p(o|c).
-  int found_10mm = 0;          // ...less than 10 mm.
-  int right = 0;               // ...with a detection (p(o|c) >= 1/2) less than 40 mm from it.
-  int right_10mm = 0;          // ...less than 10 mm.
-  int wrong = 0;               // Detections 40 mm or more from the truth, in all frames.
-  int views = 0;               // Learned, over all folds.
-  int view_points = 0;         // In them.
-  std::vector<double> points;  // Of every frame that was asked about.
+  int frames = 0;                // In which at least half of the object's surface lies in the image.
+  int found = 0;                 // ...with a pose less than 40 mm from the truth (mean point distance), whatever its p(o|c).
+  int found_10mm = 0;            // ...less than 10 mm.
+  int right = 0;                 // ...with a detection (p(o|c) >= 1/2) less than 40 mm from it.
+  int right_10mm = 0;            // ...less than 10 mm.
+  int wrong = 0;                 // Detections 40 mm or more from the truth, in all frames.
+  int views = 0;                 // Learned, over all folds.
+  int view_points = 0;           // In them.
+  std::vector<double> coded_kb;  // Of every frame that was asked about; as JPEG, else empty.
+  std::vector<double> points;    // Of every frame that was asked about.
   std::vector<double> extract_ms, whole_ms, extract_cpu_ms, whole_cpu_ms;  // Wall clock; processor time of all cores.
 };
 
