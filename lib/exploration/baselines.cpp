@@ -19,13 +19,13 @@ class RandomStrategy : public SharedStrategy {
   using SharedStrategy::SharedStrategy;
 
  protected:
-  void Choose(const Belief& /*belief*/, Decision& decision, const geometry::Rigid& T_world_camera,
+  void Choose(const Belief& /*belief*/, Decision& decision, const motion::Stance& stance,
               const motion::Mount& mount) const override {
     std::vector<Candidate*> urn = Untried(decision, mount);
     std::mt19937 generator(DecisionSeed());
     for (std::size_t left = urn.size(); left > 1; --left) std::swap(urn[generator() % left], urn[left - 1]);
     std::reverse(urn.begin(), urn.end());  // The first one drawn was put last.
-    GoToFirst(urn, decision, T_world_camera, mount);
+    GoToFirst(urn, decision, stance, mount);
   }
 };
 
@@ -34,10 +34,10 @@ class NearestStrategy : public SharedStrategy {
   using SharedStrategy::SharedStrategy;
 
  protected:
-  void Choose(const Belief& /*belief*/, Decision& decision, const geometry::Rigid& T_world_camera,
+  void Choose(const Belief& /*belief*/, Decision& decision, const motion::Stance& stance,
               const motion::Mount& mount) const override {
     const std::vector<Candidate*> untried = Untried(decision, mount);
-    PlanPaths(untried, T_world_camera, mount);
+    PlanPaths(untried, stance, mount);
     const Candidate* nearest = nullptr;
     for (const Candidate* candidate : untried) {
       if (candidate->path && (nearest == nullptr || candidate->t_move_s < nearest->t_move_s)) nearest = candidate;
@@ -57,8 +57,7 @@ class SweepStrategy : public SharedStrategy {
   using SharedStrategy::SharedStrategy;
 
  protected:
-  void Choose(const Belief& belief, Decision& decision, const geometry::Rigid& T_world_camera,
-              const motion::Mount& mount) const override {
+  void Choose(const Belief& belief, Decision& decision, const motion::Stance& stance, const motion::Mount& mount) const override {
     std::vector<Candidate*> untried = Untried(decision, mount);
     const std::vector<Eigen::Vector3d> steps = Steps(belief, decision);
     std::vector<Candidate*> queue;
@@ -70,7 +69,7 @@ class SweepStrategy : public SharedStrategy {
       queue.push_back(*nearest);
       untried.erase(nearest);
     }
-    GoToFirst(queue, decision, T_world_camera, mount);
+    GoToFirst(queue, decision, stance, mount);
   }
 
  private:
@@ -104,8 +103,7 @@ class CoverageStrategy : public SharedStrategy {
   using SharedStrategy::SharedStrategy;
 
  protected:
-  void Choose(const Belief& belief, Decision& decision, const geometry::Rigid& T_world_camera,
-              const motion::Mount& mount) const override {
+  void Choose(const Belief& belief, Decision& decision, const motion::Stance& stance, const motion::Mount& mount) const override {
     std::vector<std::pair<double, Candidate*>> queue;  // Unseen angle, less a full turn where detection is unlikely.
     for (Candidate* candidate : Untried(decision, mount)) {
       double unseen = M_PI;
@@ -120,7 +118,7 @@ class CoverageStrategy : public SharedStrategy {
     std::stable_sort(queue.begin(), queue.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
     std::vector<Candidate*> in_order;
     for (const auto& [unseen, candidate] : queue) in_order.push_back(candidate);
-    GoToFirst(in_order, decision, T_world_camera, mount);
+    GoToFirst(in_order, decision, stance, mount);
   }
 };
 

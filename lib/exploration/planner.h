@@ -3,7 +3,7 @@
 //
 //   auto strategy = MakeStrategy("planner", params, seed);
 //   while (true) {
-//     const Decision decision = strategy->Decide(belief, candidates, T_world_camera, mount, elapsed_s);
+//     const Decision decision = strategy->Decide(belief, candidates, stance, mount, elapsed_s);
 //     if (decision.chosen < 0) break;  // decision.stop says why.
 //     ... move along decision.candidates[decision.chosen].path, try to learn there, bring the belief up to date ...
 //     strategy->Report(attempt);
@@ -30,6 +30,7 @@ struct PlannerParams {
   double t_learn_s = 1.0;                // ...guess and reports is used. Likewise of one learning attempt.
   double time_budget_s = 900.0;          // Stop when that much robot time has passed; > 0.
   int max_attempts = 60;                 // Stop after so many learning attempts; >= 1.
+  bool choose_by_rate = true;            // Among views worth their cost: the most utility a second; false: the most utility.
   double failure_radius_rad = 0.17;      // An attempt that added no view lowers the belief in views this near to it; >= 0...
   double failure_discount = 0.3;         // ...by this factor each time, until some view is added; [0, 1).
   int max_path_goals = 200;              // Paths are planned for so many candidates at once, greatest worth * P * gain first, and
@@ -49,9 +50,10 @@ struct CandidateView {
 // A candidate with everything the decision was made of: a user can see why.
 struct Candidate {
   CandidateView view;
-  double detect_probability = 0.0;         // P(detect): (12) over the learned views, lowered by failures near by.
-  double gain = 0.0;                       // Equation (14): completeness with this view added minus completeness now.
-  std::optional<motion::Trajectory> path;  // World; only where it was planned and found.
+  double detect_probability = 0.0;  // P(detect): (12) over the learned views, lowered by failures near by.
+  double gain = 0.0;                // Equation (14): completeness with this view added minus completeness now.
+  // World; only where it was planned and found. The chosen one is shortened, which may leave t_move_s less than others were told.
+  std::optional<motion::Trajectory> path;
   double t_plan_s = 0.0;
   double t_move_s = 0.0;
   double t_learn_s = 0.0;
@@ -102,9 +104,9 @@ class Strategy {
  public:
   virtual ~Strategy() = default;
 
-  // Plans from where the camera is. `elapsed_s` is robot time since the start. Asking again without a Report in between gives the
-  // same answer. Cost: candidates x reachable evaluations of (12), 5 ms for 200 x 500, and the mount's planning.
-  virtual Decision Decide(const Belief& belief, const std::vector<CandidateView>& candidates, const geometry::Rigid& T_world_camera,
+  // Plans from where the mount stands. `elapsed_s` is robot time since the start. Asking again without a Report in between gives
+  // the same answer. Cost: candidates x reachable evaluations of (12), 5 ms for 200 x 500, and the mount's planning.
+  virtual Decision Decide(const Belief& belief, const std::vector<CandidateView>& candidates, const motion::Stance& stance,
                           const motion::Mount& mount, double elapsed_s) = 0;
 
   // To be told after every attempt at the view chosen last, also where the camera did not get there or saw nothing. Throws
@@ -124,7 +126,7 @@ struct OutcomeTable {
 };
 
 // Strategies by name; all but the planner and the oracle never stop for cost: baselines.
-//   planner   the greatest utility; stops where none is > 0.
+//   planner   of the views whose utility is > 0 the best (choose_by_rate says how); stops where there is none.
 //   random    any reachable candidate whose id was not tried yet, uniformly; does not ask min_detect_probability.
 //   nearest   of those not tried, the one that takes the least time to reach.
 //   sweep     round the object in steps of 20 degrees at 3 elevations, from where the camera is at first, always to the untried

@@ -12,8 +12,8 @@ SharedStrategy::SharedStrategy(const PlannerParams& params, std::uint32_t seed)
       t_plan_s_(params.t_plan_s),
       t_learn_s_(params.t_learn_s) {}
 
-Decision SharedStrategy::Decide(const Belief& belief, const std::vector<CandidateView>& candidates,
-                                const geometry::Rigid& T_world_camera, const motion::Mount& mount, double elapsed_s) {
+Decision SharedStrategy::Decide(const Belief& belief, const std::vector<CandidateView>& candidates, const motion::Stance& stance,
+                                const motion::Mount& mount, double elapsed_s) {
   const GainScorer scorer(belief, params_.rule);
   Decision decision;
   decision.completeness = scorer.completeness();
@@ -27,9 +27,13 @@ Decision SharedStrategy::Decide(const Belief& belief, const std::vector<Candidat
     decision.candidates.push_back(candidate);
   }
   Score(belief, scorer, decision.candidates);
-  Choose(belief, decision, T_world_camera, mount);
+  Choose(belief, decision, stance, mount);
   last_chosen_id_.reset();
-  if (decision.chosen >= 0) last_chosen_id_ = decision.candidates[static_cast<std::size_t>(decision.chosen)].view.id;
+  if (decision.chosen < 0) return decision;
+  Candidate& chosen = decision.candidates[static_cast<std::size_t>(decision.chosen)];
+  last_chosen_id_ = chosen.view.id;
+  chosen.path = mount.Shortened(*chosen.path, DecisionSeed());
+  SetCosts(chosen);
   return decision;
 }
 
@@ -53,19 +57,22 @@ void SharedStrategy::Report(const Attempt& attempt) {
   if (last_chosen_id_) tried_ids_.insert(*last_chosen_id_);
 }
 
-void SharedStrategy::PlanPaths(const std::vector<Candidate*>& candidates, const geometry::Rigid& T_world_camera,
+void SharedStrategy::PlanPaths(const std::vector<Candidate*>& candidates, const motion::Stance& stance,
                                const motion::Mount& mount) const {
   std::vector<geometry::Rigid> goals;
   for (const Candidate* candidate : candidates) goals.push_back(candidate->view.T_world_camera);
-  std::vector<motion::PathResult> paths = mount.Plan(T_world_camera, goals, DecisionSeed());
+  std::vector<motion::PathResult> paths = mount.Plan(stance, goals, DecisionSeed());
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     Candidate& candidate = *candidates[i];
     candidate.refusal = paths[i].refusal;
     candidate.path = std::move(paths[i].trajectory);
-    if (!candidate.path) continue;
-    candidate.t_move_s = candidate.path->duration_s();
-    candidate.utility_s = ExpectedWorth(candidate) - (candidate.t_plan_s + candidate.t_move_s + candidate.t_learn_s);
+    if (candidate.path) SetCosts(candidate);
   }
+}
+
+void SharedStrategy::SetCosts(Candidate& candidate) const {
+  candidate.t_move_s = candidate.path->duration_s();
+  candidate.utility_s = ExpectedWorth(candidate) - (candidate.t_plan_s + candidate.t_move_s + candidate.t_learn_s);
 }
 
 std::vector<Candidate*> SharedStrategy::Untried(Decision& decision, const motion::Mount& mount) const {
@@ -78,10 +85,10 @@ std::vector<Candidate*> SharedStrategy::Untried(Decision& decision, const motion
   return untried;
 }
 
-void SharedStrategy::GoToFirst(const std::vector<Candidate*>& queue, Decision& decision, const geometry::Rigid& T_world_camera,
+void SharedStrategy::GoToFirst(const std::vector<Candidate*>& queue, Decision& decision, const motion::Stance& stance,
                                const motion::Mount& mount) const {
   for (Candidate* candidate : queue) {
-    PlanPaths({candidate}, T_world_camera, mount);
+    PlanPaths({candidate}, stance, mount);
     if (!candidate->path) continue;
     decision.chosen = static_cast<int>(candidate - decision.candidates.data());
     return;

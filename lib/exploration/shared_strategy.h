@@ -12,14 +12,13 @@ class SharedStrategy : public Strategy {
  public:
   SharedStrategy(const PlannerParams& params, std::uint32_t seed);
 
-  Decision Decide(const Belief& belief, const std::vector<CandidateView>& candidates, const geometry::Rigid& T_world_camera,
+  Decision Decide(const Belief& belief, const std::vector<CandidateView>& candidates, const motion::Stance& stance,
                   const motion::Mount& mount, double elapsed_s) final;
   void Report(const Attempt& attempt) final;
 
  protected:
   // Sets chosen, or stop, and says in every candidate that was not considered why.
-  virtual void Choose(const Belief& belief, Decision& decision, const geometry::Rigid& T_world_camera,
-                      const motion::Mount& mount) const = 0;
+  virtual void Choose(const Belief& belief, Decision& decision, const motion::Stance& stance, const motion::Mount& mount) const = 0;
   // P(detect) and gain of all candidates; a strategy may know better than the belief.
   virtual void Score(const Belief& belief, const GainScorer& scorer, std::vector<Candidate>& candidates) const;
 
@@ -27,13 +26,12 @@ class SharedStrategy : public Strategy {
   double ExpectedWorth(const Candidate& candidate) const { return params_.worth_s * candidate.detect_probability * candidate.gain; }
 
   // Plans the paths to these candidates, together, and completes their costs and utilities.
-  void PlanPaths(const std::vector<Candidate*>& candidates, const geometry::Rigid& T_world_camera,
-                 const motion::Mount& mount) const;
+  void PlanPaths(const std::vector<Candidate*>& candidates, const motion::Stance& stance, const motion::Mount& mount) const;
 
   // Those that were not tried and that the mount does not refuse; the others are told why.
   std::vector<Candidate*> Untried(Decision& decision, const motion::Mount& mount) const;
   // Goes to the first of the queue that a path leads to; stops where there is none.
-  void GoToFirst(const std::vector<Candidate*>& queue, Decision& decision, const geometry::Rigid& T_world_camera,
+  void GoToFirst(const std::vector<Candidate*>& queue, Decision& decision, const motion::Stance& stance,
                  const motion::Mount& mount) const;
 
   double FailureFactor(const measures::Viewpoint& view) const { return failures_.Factor(view); }
@@ -45,6 +43,7 @@ class SharedStrategy : public Strategy {
   const PlannerParams params_;
 
  private:
+  void SetCosts(Candidate& candidate) const;  // From its path.
   StopReason StopWhateverThereIs(double completeness, double elapsed_s) const;
 
   std::uint32_t seed_;

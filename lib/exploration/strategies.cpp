@@ -9,13 +9,13 @@ namespace {
 
 constexpr double kNoGain = 1e-9;
 
-// The greatest utility (section V-C).
+// The utility of section V-C.
 class UtilityStrategy : public SharedStrategy {
  public:
   using SharedStrategy::SharedStrategy;
 
  protected:
-  void Choose(const Belief& /*belief*/, Decision& decision, const geometry::Rigid& T_world_camera,
+  void Choose(const Belief& /*belief*/, Decision& decision, const motion::Stance& stance,
               const motion::Mount& mount) const override {
     std::vector<Candidate*> queue;  // Reachable and worth something, best first.
     bool any_pays = false;
@@ -32,7 +32,7 @@ class UtilityStrategy : public SharedStrategy {
     }
     std::stable_sort(queue.begin(), queue.end(),
                      [this](const Candidate* a, const Candidate* b) { return ExpectedWorth(*a) > ExpectedWorth(*b); });
-    const Candidate* best = PlanUntilWorthwhile(queue, T_world_camera, mount);
+    const Candidate* best = PlanUntilWorthwhile(queue, stance, mount);
     if (best != nullptr) {
       decision.chosen = static_cast<int>(best - decision.candidates.data());
       return;
@@ -45,12 +45,19 @@ class UtilityStrategy : public SharedStrategy {
   }
 
  private:
+  // What is not learned now can be learned later: by utility alone it would criss-cross the sphere and pass by what lies on the
+  // way.
+  double Rate(const Candidate& candidate) const {
+    if (!params_.choose_by_rate) return candidate.utility_s;
+    return candidate.utility_s / (candidate.t_plan_s + candidate.t_move_s + candidate.t_learn_s);
+  }
+
   bool PaysBeforeTheTrip(const Candidate& candidate) const {
     return ExpectedWorth(candidate) > candidate.t_plan_s + candidate.t_learn_s;
   }
 
   // Plans paths in batches of max_path_goals: one batch, and further ones while no trip found is worth it but some may be.
-  const Candidate* PlanUntilWorthwhile(const std::vector<Candidate*>& queue, const geometry::Rigid& T_world_camera,
+  const Candidate* PlanUntilWorthwhile(const std::vector<Candidate*>& queue, const motion::Stance& stance,
                                        const motion::Mount& mount) const {
     const Candidate* best = nullptr;
     const auto batch_size = static_cast<std::size_t>(params_.max_path_goals);
@@ -59,9 +66,9 @@ class UtilityStrategy : public SharedStrategy {
       const std::size_t end = std::min(queue.size(), next + batch_size);
       const std::vector<Candidate*> batch(queue.begin() + static_cast<std::ptrdiff_t>(next),
                                           queue.begin() + static_cast<std::ptrdiff_t>(end));
-      PlanPaths(batch, T_world_camera, mount);
+      PlanPaths(batch, stance, mount);
       for (const Candidate* candidate : batch) {
-        if (candidate->utility_s > (best != nullptr ? best->utility_s : 0.0)) best = candidate;
+        if (candidate->utility_s > 0.0 && (best == nullptr || Rate(*candidate) > Rate(*best))) best = candidate;
       }
       next = end;
     }

@@ -149,7 +149,7 @@ class FreeMount : public Mount {
     return world_.IsFree(position) ? "" : kInCollision;
   }
 
-  std::vector<PathResult> Plan(const Rigid& T_world_camera_start, const std::vector<Rigid>& T_world_camera_goals,
+  std::vector<PathResult> Plan(const Stance& start, const std::vector<Rigid>& T_world_camera_goals,
                                std::uint32_t seed) const override;
 
  private:
@@ -228,8 +228,9 @@ Trajectory FreeMount::Time(const std::vector<Rigid>& poses) const {
   return trajectory;
 }
 
-std::vector<PathResult> FreeMount::Plan(const Rigid& T_world_camera_start, const std::vector<Rigid>& T_world_camera_goals,
+std::vector<PathResult> FreeMount::Plan(const Stance& stance, const std::vector<Rigid>& T_world_camera_goals,
                                         std::uint32_t seed) const {
+  const Rigid& T_world_camera_start = stance.T_world_camera;
   std::vector<PathResult> results(T_world_camera_goals.size());
   const std::string start_refusal = WhyUnreachable(T_world_camera_start);
   const ob::SpaceInformationPtr space = MakeSpace();

@@ -13,6 +13,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "motion/collision_shapes.h"
 #include "motion/hull.h"
 
 namespace vantage::motion {
@@ -47,6 +48,13 @@ std::shared_ptr<Object> MakeHull(const HullObstacle& obstacle) {
 
 }  // namespace
 
+std::vector<std::shared_ptr<Object>> MakeCollisionObjects(const Obstacles& obstacles) {
+  std::vector<std::shared_ptr<Object>> objects;
+  for (const auto& box : obstacles.boxes) objects.push_back(MakeBox(box));
+  for (const auto& hull : obstacles.hulls) objects.push_back(MakeHull(hull));
+  return objects;
+}
+
 struct CollisionWorld::Impl {
   double radius_m = 0.0;
   std::vector<std::shared_ptr<Object>> objects;
@@ -63,8 +71,7 @@ struct CollisionWorld::Impl {
 CollisionWorld::CollisionWorld(const Obstacles& obstacles, double radius_m) : impl_(std::make_unique<Impl>()) {
   if (!(radius_m > 0.0)) throw std::invalid_argument("radius_m must be > 0, is " + std::to_string(radius_m));
   impl_->radius_m = radius_m;
-  for (const auto& box : obstacles.boxes) impl_->objects.push_back(MakeBox(box));
-  for (const auto& hull : obstacles.hulls) impl_->objects.push_back(MakeHull(hull));
+  impl_->objects = MakeCollisionObjects(obstacles);
   for (const auto& object : impl_->objects) impl_->manager.registerObject(object.get());
   impl_->manager.setup();
 }

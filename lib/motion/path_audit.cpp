@@ -78,7 +78,11 @@ void Note(double clearance_m, const std::string& obstacle, double time_s, PathAu
 }  // namespace
 
 BodyAt CameraBall(double radius_m) {
-  return [radius_m](const Waypoint& waypoint) { return std::vector<BodyBall>{{waypoint.T_world_mount.translation(), radius_m}}; };
+  return [radius_m](const Waypoint& waypoint) {
+    MountBody body;
+    body.balls.push_back({waypoint.T_world_mount.translation(), radius_m});
+    return body;
+  };
 }
 
 PathAudit AuditPath(const Trajectory& path, const BodyAt& body, const Obstacles& obstacles, double step_s) {
@@ -91,7 +95,9 @@ PathAudit AuditPath(const Trajectory& path, const BodyAt& body, const Obstacles&
   const int samples = static_cast<int>(std::ceil(path.duration_s() / step_s)) + 1;
   for (int i = 0; i < samples; ++i) {
     const double time_s = std::min(i * step_s, path.duration_s());
-    for (const BodyBall& ball : body(path.Sample(time_s))) {
+    const MountBody now = body(path.Sample(time_s));
+    Note(now.self_clearance_m, "itself", time_s, audit);
+    for (const BodyBall& ball : now.balls) {
       for (const BoxObstacle& box : obstacles.boxes) {
         Note(DistanceToBox(ball.centre_in_world, box) - ball.radius_m, box.name, time_s, audit);
       }

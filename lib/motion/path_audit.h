@@ -18,7 +18,11 @@ struct BodyBall {
   double radius_m = 0.0;
 };
 // What the mount fills at a waypoint.
-using BodyAt = std::function<std::vector<BodyBall>(const Waypoint&)>;
+struct MountBody {
+  std::vector<BodyBall> balls;
+  double self_clearance_m = std::numeric_limits<double>::infinity();  // Between parts of it that must not touch; negative: they do.
+};
+using BodyAt = std::function<MountBody(const Waypoint&)>;
 
 // The body of the free camera: one ball around the camera's origin.
 BodyAt CameraBall(double radius_m);
@@ -27,7 +31,7 @@ struct PathAudit {
   // Least distance found, metres; negative where something is touched; at most kFarAudit_m, beyond which nobody asks.
   double clearance_m = std::numeric_limits<double>::infinity();
   double time_s = 0.0;   // Where that was along the path...
-  std::string obstacle;  // ...and to what.
+  std::string obstacle;  // ...and to what; "itself" where the mount met itself.
 
   bool touches() const { return clearance_m < 0.0; }
 };

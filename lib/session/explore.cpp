@@ -9,6 +9,7 @@
 namespace vantage::session {
 namespace {
 
+constexpr double kAuditStep_s = 0.01;
 constexpr double kMinShareInView = 0.7;  // A recorded pose is a candidate where this share of the model would be in the image.
 
 // One run: the robot's state and what it has learned.
@@ -23,6 +24,7 @@ class Run {
         store_(store),
         progress_(progress),
         learner_(params.learner, start.object_name),
+        mounts_(params.mount),
         strategy_(exploration::MakeStrategy(params.strategy, params.planner, params.seed, params.outcomes)) {}
 
   ExploreResult Go() {
@@ -38,7 +40,7 @@ class Run {
  private:
   void Begin() {
     const rgbd::Frame frame = world_.Look(start_.T_world_camera, params_.seed);
-    pose_ = *frame.T_world_camera;
+    stance_ = mounts_.Make({})->StanceAt(start_.T_world_camera).value_or(motion::Stance(*frame.T_world_camera));
     const learning::LearnerResult first = learner_.Process(frame, start_.target);
     if (!first.view_added) throw std::runtime_error("no object was found from the start pose: " + first.note);
     NoteScene(frame);
@@ -50,8 +52,8 @@ class Run {
   // One decision and the attempt it leads to; false when the strategy stops.
   bool Step() {
     const exploration::Belief belief = BeliefNow();
-    const auto mount = motion::MakeFreeMount(params_.mount, obstacles_);
-    const exploration::Decision decision = strategy_->Decide(belief, candidates_, pose_, *mount, result_.time.total_s());
+    const auto mount = mounts_.Make(obstacles_);
+    const exploration::Decision decision = strategy_->Decide(belief, candidates_, stance_, *mount, result_.time.total_s());
     if (decision.chosen < 0) {
       result_.stop_reason = exploration::ToString(decision.stop);
       Tell("stop: " + result_.stop_reason, &decision);
@@ -68,8 +70,9 @@ class Run {
   void Attempt(const exploration::Candidate& chosen, const exploration::Decision& decision) {
     ++result_.attempts;
     Audit(*chosen.path);
-    const rgbd::Frame frame = world_.Look(chosen.view.T_world_camera, params_.seed + 1000u * result_.attempts);
-    pose_ = *frame.T_world_camera;
+    const motion::Waypoint& end = chosen.path->waypoints.back();  // An arm may have turned the camera about its axis.
+    const rgbd::Frame frame = world_.Look(end.T_world_mount, params_.seed + 1000u * result_.attempts);
+    stance_ = {*frame.T_world_camera, end.joints_rad};
     const learning::LearnerResult learned = learner_.Process(frame);
     exploration::Attempt attempt;
     attempt.viewpoint = chosen.view.viewpoint;
@@ -97,7 +100,7 @@ class Run {
       }
       all.hulls.push_back(std::move(hull));
     }
-    const motion::PathAudit audit = motion::AuditPath(path, motion::CameraBall(params_.mount.camera_radius_m), all);
+    const motion::PathAudit audit = motion::AuditPath(path, mounts_.Body(), all, kAuditStep_s);
     ++result_.audit.paths;
     result_.audit.touching += audit.touches();
     if (audit.clearance_m >= result_.audit.clearance_m) return;
@@ -154,7 +157,7 @@ class Run {
       if (ShareInImage(points, recorded[i].inverse() * T_world_object, world_.Camera()) < kMinShareInView) continue;
       candidates_.push_back({static_cast<int>(i), recorded[i], exploration::ViewpointOf(recorded[i], T_world_object)});
     }
-    const auto mount = motion::MakeFreeMount(params_.mount, obstacles_);
+    const auto mount = mounts_.Make(obstacles_);
     for (const exploration::CandidateView& candidate : candidates_) {
       if (mount->WhyUnreachable(candidate.T_world_camera).empty()) reachable_.push_back({candidate.viewpoint, 1.0});
     }
@@ -198,8 +201,9 @@ class Run {
   const std::function<void(const ExploreStep&)>& progress_;
 
   learning::Learner learner_;
+  motion::MountMaker mounts_;
   std::unique_ptr<exploration::Strategy> strategy_;
-  geometry::Rigid pose_ = geometry::Rigid::Identity();  // T_world_camera now.
+  motion::Stance stance_;  // Now.
   motion::Obstacles obstacles_;
   std::vector<assessment::Background> backgrounds_;
   std::vector<assessment::Trial> trials_;

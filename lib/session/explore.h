@@ -23,7 +23,7 @@ struct ExploreParams {
   learning::LearnerParams learner;
   exploration::PlannerParams planner;
   exploration::CandidateParams candidates;  // Where any pose can be taken; a recorded world has its own.
-  motion::FreeMountParams mount;
+  motion::MountParams mount;
   assessment::TrialParams trials;
   std::string strategy = "planner";  // A name of exploration::StrategyNames().
   // What the strategy "oracle" knows; null for the others. Must outlive the run.

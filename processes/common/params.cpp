@@ -240,6 +240,7 @@ void Fields(Visitor& visit, exploration::PlannerParams& params) {
   visit("t_learn_s", params.t_learn_s);
   visit("time_budget_s", params.time_budget_s);
   visit("max_attempts", params.max_attempts);
+  visit("choose_by_rate", params.choose_by_rate);
   visit("failure_radius_rad", params.failure_radius_rad);
   visit("failure_discount", params.failure_discount);
   visit("max_path_goals", params.max_path_goals);
@@ -269,6 +270,27 @@ void Fields(Visitor& visit, motion::FreeMountParams& params) {
   visit("workspace_upper_m", params.workspace_upper_m);
   visit("roadmap_samples", params.roadmap_samples);
   visit.Nested("limits", params.limits);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, motion::ArmMountParams& params) {
+  visit("urdf", params.urdf);
+  visit("base_position_m", params.base_position_m);
+  visit("base_yaw_rad", params.base_yaw_rad);
+  visit("base_roll_rad", params.base_roll_rad);
+  visit("camera_position_m", params.camera_position_m);
+  visit("clearance_m", params.clearance_m);
+  visit("max_acceleration_rad_s2", params.max_acceleration_rad_s2);
+  visit("ik_seeds", params.ik_seeds);
+  visit("ik_solutions", params.ik_solutions);
+  visit("roadmap_samples", params.roadmap_samples);
+}
+
+template <typename Visitor>
+void Fields(Visitor& visit, motion::MountParams& params) {
+  visit("type", params.type);
+  visit.Nested("free", params.free);
+  visit.Nested("arm", params.arm);
 }
 
 template <typename Visitor>
@@ -369,7 +391,7 @@ void Read(config::Mapping mapping, learning::LearnerParams& params) { ReadWhole(
 void Read(config::Mapping mapping, assessment::TrialParams& params) { ReadWhole(mapping, params); }
 void Read(config::Mapping mapping, exploration::PlannerParams& params) { ReadWhole(mapping, params); }
 void Read(config::Mapping mapping, exploration::CandidateParams& params) { ReadWhole(mapping, params); }
-void Read(config::Mapping mapping, motion::FreeMountParams& params) { ReadWhole(mapping, params); }
+void Read(config::Mapping mapping, motion::MountParams& params) { ReadWhole(mapping, params); }
 
 void ReadSections(config::Mapping& mapping, LibraryParams& params) {
   YamlReader reader(mapping);
@@ -382,6 +404,8 @@ LibraryParams LoadLibraryParams(const std::filesystem::path& file) {
   LibraryParams params;
   ReadSections(mapping, params);
   mapping.Finish();
+  std::string& urdf = params.mount.arm.urdf;
+  if (!urdf.empty() && std::filesystem::path(urdf).is_relative()) urdf = (file.parent_path() / urdf).string();
   return params;
 }
 

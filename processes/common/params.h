@@ -22,7 +22,7 @@ void Read(config::Mapping mapping, learning::LearnerParams& params);
 void Read(config::Mapping mapping, assessment::TrialParams& params);
 void Read(config::Mapping mapping, exploration::PlannerParams& params);
 void Read(config::Mapping mapping, exploration::CandidateParams& params);
-void Read(config::Mapping mapping, motion::FreeMountParams& params);
+void Read(config::Mapping mapping, motion::MountParams& params);
 
 // What the command line and the processes share, as in config/library.yaml.
 struct LibraryParams {
@@ -31,11 +31,12 @@ struct LibraryParams {
   assessment::TrialParams trials;
   exploration::PlannerParams planner;
   exploration::CandidateParams candidates;
-  motion::FreeMountParams mount;
+  motion::MountParams mount;
 };
 
 // The sections present in the mapping, which may hold others: the caller calls Finish.
 void ReadSections(config::Mapping& mapping, LibraryParams& params);
+// mount.arm.urdf, where it is relative, is relative to the file's folder.
 LibraryParams LoadLibraryParams(const std::filesystem::path& file);
 
 // Every value as text by its dotted key, such as "recogniser.ransac.inlier_px": for logs and comparisons.

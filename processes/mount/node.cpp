@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <vantage/operator_command_t.hpp>
 
+#include "common/params.h"
 #include "messaging/channels.h"
 
 namespace vantage::mount {
@@ -25,6 +26,7 @@ void MountParams::Check() const {
     if (!ok) throw std::invalid_argument(what);
   };
   limits.Check();
+  mount.Check();
   require(start_eye_m.allFinite() && start_target_m.allFinite() && start_eye_m != start_target_m,
           "start_eye_m and start_target_m must be different points");
   require(tolerance >= 0.0, "tolerance must be >= 0");
@@ -33,8 +35,9 @@ void MountParams::Check() const {
   require(rate_hz >= 1.0 && rate_hz <= 1000.0, "rate_hz must be in [1, 1000]");
 }
 
-MountParams LoadMountParams(const std::string& file) {
+MountParams LoadMountParams(const std::string& file, const std::string& library_file) {
   MountParams params;
+  if (!library_file.empty()) params.mount = params::LoadLibraryParams(library_file).mount;
   if (file.empty()) return params;
   auto yaml = config::Mapping::Load(file);
   yaml.Get("start_eye_m", params.start_eye_m);
@@ -81,10 +84,17 @@ std::string WhyRefused(const motion::Trajectory& trajectory, const geometry::Rig
   return "";
 }
 
-MountNode::MountNode(messaging::Bus& bus, const MountParams& params) : Node(bus, "mount"), params_(params) {
-  params_.Check();
-  state_.T_mount_camera.translation() = params_.camera_position_m;
-  const geometry::Rigid T_world_camera = geometry::LookAt(params_.start_eye_m, params_.start_target_m, Eigen::Vector3d::UnitZ());
+MountNode::MountNode(messaging::Bus& bus, const MountParams& params)
+    : Node(bus, "mount"), params_((params.Check(), params)), mounts_(params.mount) {
+  const bool is_arm = params_.mount.type == "arm";
+  state_.T_mount_camera.translation() = is_arm ? params_.mount.arm.camera_position_m : params_.camera_position_m;
+  geometry::Rigid T_world_camera = geometry::LookAt(params_.start_eye_m, params_.start_target_m, Eigen::Vector3d::UnitZ());
+  if (is_arm) {
+    const auto stance = mounts_.Make({})->StanceAt(T_world_camera);
+    if (!stance) throw std::invalid_argument("the arm cannot reach from start_eye_m to look at start_target_m");
+    T_world_camera = stance->T_world_camera;
+    state_.joints_rad = stance->joints_rad;
+  }
   state_.T_world_mount = T_world_camera * state_.T_mount_camera.inverse();
   Subscribe<mount_command_t>(messaging::kMountCommand, [this](const mount_command_t& message) { OnCommand(message); });
   Subscribe<operator_command_t>(messaging::kOperatorCommand, [this](const operator_command_t& message) {
@@ -122,7 +132,9 @@ void MountNode::OnCommand(const mount_command_t& message) {
   } else if (driving_) {
     refusal = "command " + std::to_string(state_.command_id) + " is being driven; send one without waypoints to stop it";
   } else {
-    refusal = WhyRefused(*trajectory, state_.T_world_mount, params_);
+    refusal = state_.joints_rad.size() > 0
+                  ? mounts_.WhyNotDriven(*trajectory, state_.joints_rad, params_.max_start_angle_rad, params_.tolerance)
+                  : WhyRefused(*trajectory, state_.T_world_mount, params_);
   }
 
   next_publish_us_ = 0;
@@ -153,7 +165,9 @@ void MountNode::Advance() {
   state_.utime = now_us();
   if (!driving_) return;
   const double time_s = 1e-6 * static_cast<double>(state_.utime - driving_since_us_);
-  state_.T_world_mount = driving_->At(time_s);
+  const motion::Waypoint now = driving_->Sample(time_s);
+  state_.T_world_mount = now.T_world_mount;
+  if (state_.joints_rad.size() > 0) state_.joints_rad = now.joints_rad;
   if (time_s < driving_->duration_s()) return;
   driving_.reset();
   state_.moving = false;

@@ -7,6 +7,7 @@
 #include "config/yaml.h"
 #include "messaging/mount_messages.h"
 #include "messaging/node.h"
+#include "motion/mount.h"
 
 namespace vantage::mount {
 
@@ -14,6 +15,7 @@ struct MountParams {
   Eigen::Vector3d start_eye_m{0.55, 0.0, 0.45};      // World; where the camera is at first...
   Eigen::Vector3d start_target_m{0.0, 0.0, 0.08};    // ...and what it looks at.
   Eigen::Vector3d camera_position_m{0.0, 0.0, 0.0};  // Of the camera on the mount (T_mount_camera); axes are the mount's.
+  motion::MountParams mount;                         // Of the library: an arm has joints, and its own camera_position_m counts.
   motion::SpeedLimits limits;                        // A command that breaks them is refused.
   double tolerance = 0.1;                            // ...by more than this share; >= 0.
   double max_start_distance_m = 0.02;                // A trajectory starts at most so far from where the mount is; > 0.
@@ -23,10 +25,11 @@ struct MountParams {
   void Check() const;  // Throws std::invalid_argument naming the field.
 };
 
-// Reads the fields of the YAML file; throws std::runtime_error "FILE:LINE: ...".
-MountParams LoadMountParams(const std::string& file);
+// Reads the fields of the YAML file, and the library's mount from `library_file`; either may be empty. Throws std::runtime_error
+// "FILE:LINE: ...".
+MountParams LoadMountParams(const std::string& file, const std::string& library_file = "");
 
-// Why this trajectory must not be driven from here; empty where it may.
+// Why this trajectory of a mount without joints must not be driven from here; empty where it may.
 std::string WhyRefused(const motion::Trajectory& trajectory, const geometry::Rigid& T_world_mount, const MountParams& params);
 
 class MountNode : public messaging::Node {
@@ -47,6 +50,7 @@ class MountNode : public messaging::Node {
   void Advance();
 
   MountParams params_;
+  motion::MountMaker mounts_;
   messaging::MountState state_;
   std::optional<motion::Trajectory> driving_;
   std::int64_t driving_since_us_ = 0;

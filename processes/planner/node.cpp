@@ -37,7 +37,8 @@ motion::Trajectory ForMount(motion::Trajectory camera_path, const geometry::Rigi
 PlannerNode::PlannerNode(messaging::Bus& bus, const PlannerNodeParams& params)
     : Node(bus, "planner"),
       params_((params.Check(), params)),
-      strategy_(exploration::MakeStrategy(params.strategy, params.planner, params.seed)) {
+      strategy_(exploration::MakeStrategy(params.strategy, params.planner, params.seed)),
+      mounts_(params.mount) {
   status_.run_id = now_us();
   status_.state = "waiting";
   status_.target_completeness = params_.planner.target_completeness;
@@ -191,13 +192,14 @@ void PlannerNode::Plan() {
   const messaging::Stopwatch stopwatch(bus_);
   if (first_decision_us_ == 0) first_decision_us_ = now_us();
   ListCandidates();
-  const auto mount = motion::MakeFreeMount(params_.mount, obstacles_);
+  const auto mount = mounts_.Make(obstacles_);
   belief_.reachable.clear();
   for (const auto& candidate : candidates_) {
     if (mount->WhyUnreachable(candidate.T_world_camera).empty()) belief_.reachable.push_back({candidate.viewpoint, 1.0});
   }
   if (ElapsedSince(first_decision_us_) > BudgetS()) return Finish(exploration::ToString(exploration::StopReason::kTimeBudget));
-  decision_ = strategy_->Decide(belief_, candidates_, mount_state_->T_world_camera(), *mount, ElapsedSince(first_decision_us_));
+  decision_ = strategy_->Decide(belief_, candidates_, {mount_state_->T_world_camera(), mount_state_->joints_rad}, *mount,
+                                ElapsedSince(first_decision_us_));
   plan_s_ = 1e-3 * stopwatch.ms();
   total_plan_s_ += plan_s_;
   status_.completeness = decision_->completeness;

@@ -37,7 +37,7 @@ struct PlannerNodeParams {
   bool exit_when_done = false;    // The process ends with the run.
   exploration::PlannerParams planner;
   exploration::CandidateParams candidates;
-  motion::FreeMountParams mount;
+  motion::MountParams mount;
 
   void Check() const;  // Throws std::invalid_argument naming the field.
 };
@@ -124,6 +124,7 @@ class PlannerNode : public messaging::Node {
   std::optional<int> stop_considered_;   // The measured views a decision to stop was made with...
   std::int64_t stop_considered_us_ = 0;  // ...and when it was made first.
   std::int64_t first_decision_us_ = 0;
+  motion::MountMaker mounts_;
   motion::Obstacles obstacles_;
   std::vector<exploration::CandidateView> candidates_;
   std::optional<exploration::Decision> decision_;

@@ -195,7 +195,7 @@ Scenario SimulatedScenario(const std::string& world_file, const std::vector<std:
   scenario.world = world;
   scenario.recogniser = params.recogniser;
   scenario.judge = std::make_unique<session::Judge>(scenario.recogniser, placed.truth.points);
-  const auto mount = motion::MakeFreeMount(params.mount, EverythingIn(*world));
+  const auto mount = motion::MountMaker(params.mount).Make(EverythingIn(*world));
   std::mt19937 random(seed ^ kJudgeSeed);
   for (int tries = 0; tries < 20 * judge_views && scenario.judge->size() < judge_views; ++tries) {
     const geometry::Rigid T_world_camera = RandomLook(random, placed.centre_in_world, params.candidates);

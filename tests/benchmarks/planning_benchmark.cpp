@@ -54,6 +54,40 @@ void PlanPaths(benchmark::State& state) {
 }
 BENCHMARK(PlanPaths)->Arg(15)->Arg(150)->Unit(benchmark::kMillisecond);
 
+// The arm among the same things: paths to all of about 150 and 300 views, everything made anew as for a decision; and the
+// shortening of the one that is driven.
+void PlanArmPaths(benchmark::State& state) {
+  motion::MountParams params;
+  params.type = "arm";
+  params.arm.urdf = VANTAGE_SOURCE_DIR "/config/robots/arm.urdf";
+  const motion::MountMaker maker(params);
+  const motion::Obstacles obstacles = TableWithThreeThings();
+  std::vector<geometry::Rigid> goals;
+  for (const auto& candidate : Around(static_cast<int>(state.range(0) * 2.45))) goals.push_back(candidate.T_world_camera);
+  const auto start = maker.Make(obstacles)->StanceAt(geometry::LookAt({0.4, 0.1, 0.4}, {0.0, 0.0, 0.1}, Eigen::Vector3d::UnitZ()));
+  if (!start) return state.SkipWithError("the start is out of reach");
+  double with_path = 0, shortened_s = 0, planned_s = 0;
+  for (auto _ : state) {
+    const auto mount = maker.Make(obstacles);
+    const auto results = mount->Plan(*start, goals, 0);
+    with_path = planned_s = shortened_s = 0;
+    const motion::Trajectory* longest = nullptr;
+    for (const auto& result : results) {
+      if (!result.trajectory) continue;
+      ++with_path;
+      if (longest == nullptr || result.trajectory->duration_s() > longest->duration_s()) longest = &*result.trajectory;
+    }
+    if (longest == nullptr) continue;
+    planned_s = longest->duration_s();
+    shortened_s = mount->Shortened(*longest, 0).duration_s();
+  }
+  state.counters["goals"] = static_cast<double>(goals.size());
+  state.counters["with_path"] = with_path;
+  state.counters["longest_s"] = planned_s;
+  state.counters["shortened_s"] = shortened_s;
+}
+BENCHMARK(PlanArmPaths)->Arg(150)->Arg(300)->Unit(benchmark::kMillisecond)->UseRealTime();
+
 // 200 candidates, 500 query directions, 20 learned views; with paths or scored alone.
 void Decide(benchmark::State& state) {
   const auto candidates = Around(490);
@@ -66,7 +100,7 @@ void Decide(benchmark::State& state) {
   motion::FreeMountParams mount_params;
   if (state.range(1) == 0) mount_params.workspace_upper_m = Eigen::Vector3d(-1.4, -1.4, -0.4);  // All refused: scoring alone.
   const auto mount = motion::MakeFreeMount(mount_params, TableWithThreeThings());
-  const auto start = geometry::LookAt({-0.6, 0.1, 0.12}, {0.0, 0.0, 0.1}, Eigen::Vector3d::UnitZ());
+  const motion::Stance start(geometry::LookAt({-0.6, 0.1, 0.12}, {0.0, 0.0, 0.1}, Eigen::Vector3d::UnitZ()));
   const auto strategy = exploration::MakeStrategy("planner", params, 0);
   for (auto _ : state) benchmark::DoNotOptimize(strategy->Decide(belief, candidates, start, *mount, 0.0));
   state.counters["candidates"] = static_cast<double>(candidates.size());

@@ -40,7 +40,7 @@ TEST(Params, TheShippedFileNamesEveryField) {
 TEST(Params, ValuesReachTheirStructs) {
   config::Mapping mapping = config::Mapping::Parse(
       "recogniser:\n  ransac: {inlier_px: 2.5}\n  seed: 9\nplanner: {rule: noisy_or}\ncandidates: {distances_m: [0.5, 0.8]}\n"
-      "mount:\n  workspace_lower_m: [-2, -1, 0]\n  limits: {max_speed_m_s: 0.1}\n",
+      "mount:\n  free:\n    workspace_lower_m: [-2, -1, 0]\n    limits: {max_speed_m_s: 0.1}\n",
       "a.yaml");
   LibraryParams params;
   ReadSections(mapping, params);
@@ -50,8 +50,8 @@ TEST(Params, ValuesReachTheirStructs) {
   EXPECT_EQ(params.learner.recogniser.ransac.inlier_px, 2.5) << "the learner recognises as the recogniser does";
   EXPECT_EQ(params.planner.rule, measures::CompletenessRule::kNoisyOr);
   EXPECT_EQ(params.candidates.distances_m, (std::vector<double>{0.5, 0.8}));
-  EXPECT_EQ(params.mount.workspace_lower_m, Eigen::Vector3d(-2, -1, 0));
-  EXPECT_EQ(params.mount.limits.max_speed_m_s, 0.1);
+  EXPECT_EQ(params.mount.free.workspace_lower_m, Eigen::Vector3d(-2, -1, 0));
+  EXPECT_EQ(params.mount.free.limits.max_speed_m_s, 0.1);
   EXPECT_NE(Flatten(params), Flatten(LibraryParams()));
 }
 

@@ -91,6 +91,7 @@ TEST(Planner, AnExpensiveTripLosesAgainstACheapOneOfLessGain) {
   const std::vector<CandidateView> two = {ViewFrom(1, 25.0), ViewFrom(2, -18.0)};  // The first has more to gain.
   const auto start = ViewFrom(0, -15.0).T_world_camera;
   PlannerParams params;
+  params.choose_by_rate = false;
   TestMount slow;
   slow.limits.max_speed_m_s = 0.01;
   params.worth_s = 1e5;  // Time does not matter: the greater gain.
@@ -100,6 +101,18 @@ TEST(Planner, AnExpensiveTripLosesAgainstACheapOneOfLessGain) {
   EXPECT_EQ(Chosen(decision).view.id, 2);
   EXPECT_GT(decision.candidates[0].gain * decision.candidates[0].detect_probability,
             decision.candidates[1].gain * decision.candidates[1].detect_probability);
+}
+
+TEST(Planner, ByRateTakesWhatLiesOnTheWay) {
+  const auto ring = Ring(5.0);
+  const Belief belief = BeliefFrom({ring[0]}, ring);
+  const std::vector<CandidateView> two = {ViewFrom(1, 25.0), ViewFrom(2, -18.0)};  // The first has more to gain.
+  const auto start = ViewFrom(0, -15.0).T_world_camera;
+  PlannerParams params;
+  params.worth_s = 1e5;
+  TestMount slow;
+  slow.limits.max_speed_m_s = 0.01;
+  EXPECT_EQ(Chosen(MakeStrategy("planner", params, 0)->Decide(belief, two, start, slow, 0.0)).view.id, 2);
 }
 
 TEST(Planner, AFailureChangesTheChoiceUntilAViewIsAdded) {

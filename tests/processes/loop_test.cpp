@@ -60,7 +60,7 @@ TEST(Loop, ExploresAWorldAndStopsForAStatedReason) {
   assessor::AssessorNode assessor(bus, assessor_params);
   planner::PlannerNodeParams planner_params;
   planner_params.planner.max_attempts = 2;
-  planner_params.mount.limits = Quick();
+  planner_params.mount.free.limits = Quick();
   planner_params.summary = folder / "summary.json";
   planner::PlannerNode planner(bus, planner_params);
 
