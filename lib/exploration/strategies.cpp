@@ -15,8 +15,8 @@ class UtilityStrategy : public SharedStrategy {
   using SharedStrategy::SharedStrategy;
 
  protected:
-  void Choose(const Belief& /*belief*/, Decision& decision, const motion::Stance& stance,
-              const motion::Mount& mount) const override {
+  void Choose(const Belief& belief, Decision& decision, const motion::Stance& stance, const motion::Mount& mount) const override {
+    if (belief.reachable.empty() && AllRefused(decision, mount)) return;
     std::vector<Candidate*> queue;  // Reachable and worth something, best first.
     bool any_pays = false;
     for (Candidate& candidate : decision.candidates) {
@@ -45,6 +45,16 @@ class UtilityStrategy : public SharedStrategy {
   }
 
  private:
+  // Without any place to see the object from, no view gains anything: the mount's words are the better reason.
+  static bool AllRefused(Decision& decision, const motion::Mount& mount) {
+    for (Candidate& candidate : decision.candidates) {
+      candidate.refusal = mount.WhyUnreachable(candidate.view.T_world_camera);
+      if (candidate.refusal.empty()) return false;
+    }
+    decision.stop = StopReason::kNothingReachable;
+    return true;
+  }
+
   // What is not learned now can be learned later: by utility alone it would criss-cross the sphere and pass by what lies on the
   // way.
   double Rate(const Candidate& candidate) const {

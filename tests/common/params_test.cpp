@@ -55,6 +55,14 @@ TEST(Params, ValuesReachTheirStructs) {
   EXPECT_NE(Flatten(params), Flatten(LibraryParams()));
 }
 
+TEST(Params, TheShippedArmIsThere) {
+  const auto file = std::filesystem::path(VANTAGE_SOURCE_DIR) / "config" / "library_arm.yaml";
+  const LibraryParams params = LoadLibraryParams(file);
+  EXPECT_EQ(params.mount.type, "arm");
+  EXPECT_TRUE(std::filesystem::exists(params.mount.arm.urdf)) << params.mount.arm.urdf << " is relative to the file";
+  EXPECT_NE(ErrorOf("mount:\n  type: arm\n").find("urdf"), std::string::npos);
+}
+
 TEST(Params, ErrorsNameFileAndLine) {
   EXPECT_EQ(ErrorOf("recogniser:\n  max_ration: 0.8\n").rfind("a.yaml:2: unknown key 'max_ration'", 0), 0u);
   EXPECT_EQ(ErrorOf("recogniser:\n  ransac:\n    inlier: 3\n").rfind("a.yaml:3: unknown key 'inlier'", 0), 0u);

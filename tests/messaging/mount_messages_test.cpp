@@ -19,6 +19,25 @@ motion::Trajectory StraightLine(int waypoints) {
   return trajectory;
 }
 
+TEST(MountMessages, JointsGoThereAndBack) {
+  motion::Trajectory trajectory = StraightLine(3);
+  for (auto& waypoint : trajectory.waypoints) waypoint.joints_rad = Eigen::VectorXd::LinSpaced(6, -1.0, 1.0 + waypoint.time_s);
+  mount_command_t message = ToMessage(trajectory, 1, 2);
+  const auto back = FromMessage(message);
+  ASSERT_TRUE(back) << back.error;
+  EXPECT_EQ(back->waypoints[2].joints_rad, trajectory.waypoints[2].joints_rad);
+  message.waypoints[1].joints_rad[3] = std::nan("");
+  EXPECT_NE(FromMessage(message).error.find("waypoint 1"), std::string::npos);
+  message = ToMessage(trajectory, 1, 2);
+  message.waypoints[2].joints_rad.pop_back();
+  EXPECT_NE(FromMessage(message).error.find("equally many"), std::string::npos);
+  MountState state;
+  state.joints_rad = Eigen::VectorXd::LinSpaced(6, -1.0, 1.0);
+  EXPECT_EQ(FromMessage(ToMessage(state))->joints_rad, state.joints_rad);
+  state.joints_rad = Eigen::VectorXd::Zero(17);
+  EXPECT_FALSE(FromMessage(ToMessage(state)));
+}
+
 TEST(MountMessages, TrajectoriesSurviveTheWire) {
   const auto trajectory = StraightLine(20);
   const auto back = FromMessage(ToMessage(trajectory, 4, 123));

@@ -53,6 +53,52 @@ class MountTest : public ::testing::Test {
   std::vector<MountState> states_;
 };
 
+TEST(ArmMountTest, DrivesJointsAndRefusesWhatIsNoWayForThem) {
+  std::int64_t now_us = 1000000;
+  messaging::Bus bus("memq://", [&now_us] { return now_us; });
+  MountParams params;
+  params.mount.type = "arm";
+  params.mount.arm.urdf = std::string(VANTAGE_SOURCE_DIR) + "/config/robots/arm.urdf";
+  MountNode node(bus, params);
+  ASSERT_EQ(node.state().joints_rad.size(), 6);
+  EXPECT_EQ(Eigen::Vector3d(node.state().T_mount_camera.translation()), params.mount.arm.camera_position_m);
+  const Eigen::Vector3d eye = node.state().T_world_camera().translation();
+  EXPECT_LT((eye - params.start_eye_m).norm(), 1e-3);
+
+  const auto arm = motion::MountMaker(params.mount).Make({});
+  const geometry::Rigid goal = geometry::LookAt({0.3, 0.4, 0.5}, {0, 0, 0.08}, Eigen::Vector3d::UnitZ());
+  const auto planned = arm->Plan({node.state().T_world_camera(), node.state().joints_rad}, {goal}, 0);
+  ASSERT_TRUE(planned[0].trajectory.has_value()) << planned[0].refusal;
+  motion::Trajectory path = *planned[0].trajectory;
+  for (auto& waypoint : path.waypoints) waypoint.T_world_mount = waypoint.T_world_mount * node.state().T_mount_camera.inverse();
+  const auto send = [&](const motion::Trajectory& trajectory, std::int64_t id) {
+    bus.Publish(messaging::kMountCommand, messaging::ToMessage(trajectory, id, now_us));
+    bus.Drain();
+    node.RunStep();
+  };
+
+  motion::Trajectory poses_only = path;
+  for (auto& waypoint : poses_only.waypoints) waypoint.joints_rad = {};
+  send(poses_only, 1);
+  EXPECT_EQ(node.state().refusal, "needs 6 joints, has 0");
+  motion::Trajectory hasty = path;
+  for (auto& waypoint : hasty.waypoints) waypoint.time_s /= 3.0;
+  send(hasty, 2);
+  EXPECT_NE(node.state().refusal.find("turns at"), std::string::npos) << node.state().refusal;
+  motion::Trajectory elsewhere = path;
+  for (auto& waypoint : elsewhere.waypoints) waypoint.joints_rad[0] += 0.2;
+  send(elsewhere, 3);
+  EXPECT_NE(node.state().refusal.find("is not where the arm is"), std::string::npos) << node.state().refusal;
+
+  send(path, 4);
+  EXPECT_EQ(node.state().refusal, "");
+  now_us += static_cast<std::int64_t>(1e6 * (path.duration_s() + 0.1));
+  node.RunStep();
+  EXPECT_EQ(node.state().result, MountState::Result::kArrived);
+  EXPECT_LT((node.state().T_world_camera().translation() - goal.translation()).norm(), 1e-3);
+  EXPECT_EQ(node.state().joints_rad, path.waypoints.back().joints_rad);
+}
+
 TEST_F(MountTest, SaysWhereItIsThirtyTimesASecond) {
   states_.clear();
   Run(2.0);

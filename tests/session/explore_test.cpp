@@ -80,6 +80,19 @@ TEST_F(Table, SameSeedSameRun) {
   EXPECT_EQ(a.object->points.size(), b.object->points.size());
 }
 
+TEST_F(Table, AnArmExploresAndTouchesNothing) {
+  ExploreParams params = QuickParams();
+  params.mount.type = "arm";
+  params.mount.arm.urdf = std::string(VANTAGE_SOURCE_DIR) + "/config/robots/arm.urdf";
+  params.candidates.distances_m = {0.5};
+  const ExploreResult result = Explore(*world_, Start(), params, nullptr, nullptr);
+  EXPECT_EQ(result.attempts, 3);
+  EXPECT_GE(result.views, 2);
+  EXPECT_GT(result.time.move_s, 0.0);
+  EXPECT_EQ(result.audit.paths, 3);
+  EXPECT_EQ(result.audit.touching, 0) << result.audit.obstacle << " " << result.audit.clearance_m;
+}
+
 TEST_F(Table, SaysWhenNothingIsThereToLearn) {
   ExploreStart start = Start();
   start.T_world_camera = geometry::LookAt({0, 0, 1.0}, {3, 0, 1.0}, Eigen::Vector3d::UnitZ());  // At the wall.
