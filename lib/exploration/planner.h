@@ -35,7 +35,7 @@ struct PlannerParams {
   double failure_discount = 0.3;         // ...by this factor each time, until some view is added; [0, 1).
   int max_path_goals = 200;              // Paths are planned for so many candidates at once, greatest worth * P * gain first, and
                                          // for more only while none of those is worth its trip; >= 1.
-  measures::CompletenessRule rule = measures::CompletenessRule::kMax;
+  measures::CompletenessRule rule = measures::CompletenessRule::kCommonCause;
 
   void Check() const;  // Throws std::invalid_argument naming the field.
 };

@@ -16,19 +16,19 @@
 namespace vantage::assessor {
 
 struct AssessorNodeParams {
-  std::string store = "models.db";  // File, only read; it may appear later.
-  std::string rule = "max";         // How the views' probabilities combine: max, noisy_or, clipped_sum.
-  int azimuth_cells = 36;           // Of the sphere that is published; 1..360.
-  int elevation_cells = 18;         // Likewise; 1..180.
-  double min_elevation_rad = 0.17;  // Until PLANNER_REACH says what can be seen: the sphere between these...
-  double max_elevation_rad = 1.4;   // ...counts, from...
-  std::vector<double> distances_m;  // ...these distances, each > 0; empty: from the median distance of the views.
-  double publish_period_s = 1.0;    // > 0.
-  double retry_period_s = 5.0;      // After an error; > 0.
-  int max_backgrounds = 8;          // Of the run's own frames; >= 0.
-  int niceness = 5;                 // Of the thread that runs trials; 0..19.
-  int job_frames = 0;               // Trials take effect so many frames after they began, and are waited for where they are not
-                                    // done by then: a replay is the same on every run. 0: as soon as they are done.
+  std::string store = "models.db";    // File, only read; it may appear later.
+  std::string rule = "common_cause";  // How the views' probabilities combine: max, common_cause, noisy_or, clipped_sum.
+  int azimuth_cells = 36;             // Of the sphere that is published; 1..360.
+  int elevation_cells = 18;           // Likewise; 1..180.
+  double min_elevation_rad = 0.17;    // Until PLANNER_REACH says what can be seen: the sphere between these...
+  double max_elevation_rad = 1.4;     // ...counts, from...
+  std::vector<double> distances_m;    // ...these distances, each > 0; empty: from the median distance of the views.
+  double publish_period_s = 1.0;      // > 0.
+  double retry_period_s = 5.0;        // After an error; > 0.
+  int max_backgrounds = 8;            // Of the run's own frames; >= 0.
+  int niceness = 5;                   // Of the thread that runs trials; 0..19.
+  int job_frames = 0;                 // Trials take effect so many frames after they began, and are waited for where they are not
+                                      // done by then: a replay is the same on every run. 0: as soon as they are done.
   recognition::RecogniserParams recogniser;
   assessment::TrialParams trials;
   segmentation::PlaneParams plane;
