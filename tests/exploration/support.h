@@ -68,7 +68,8 @@ class TestMount : public motion::Mount {
 
   std::string WhyUnreachable(const geometry::Rigid& T_world_camera) const override { return unreachable(T_world_camera); }
 
-  std::vector<motion::PathResult> Plan(const motion::Stance& start, const std::vector<geometry::Rigid>& T_world_camera_goals, std::uint32_t) const override {
+  std::vector<motion::PathResult> Plan(const motion::Stance& start, const std::vector<geometry::Rigid>& T_world_camera_goals,
+                                       std::uint32_t) const override {
     goals_planned.push_back(T_world_camera_goals.size());
     std::vector<motion::PathResult> results;
     for (const geometry::Rigid& goal : T_world_camera_goals) {
