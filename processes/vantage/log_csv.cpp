@@ -5,6 +5,7 @@
 #include <vantage/answer_t.hpp>
 #include <vantage/completeness_t.hpp>
 #include <vantage/detections_t.hpp>
+#include <vantage/host_clock_t.hpp>
 #include <vantage/image_part_t.hpp>
 #include <vantage/measures_t.hpp>
 #include <vantage/mount_command_t.hpp>
@@ -16,6 +17,9 @@
 #include <vantage/reach_t.hpp>
 #include <vantage/scene_t.hpp>
 #include <vantage/status_t.hpp>
+#include <vantage/store_list_t.hpp>
+#include <vantage/store_part_t.hpp>
+#include <vantage/store_query_t.hpp>
 #include <vantage/track_t.hpp>
 #include <vantage/view_t.hpp>
 #include <vector>
@@ -67,6 +71,17 @@ std::int64_t Integer(bool value) { return value ? 1 : 0; }
 
 Row Begin(std::int64_t utime) { return Row().Add("utime", utime); }
 
+// A row for every item of a message: `add` adds the item's columns to the message's own.
+template <typename Items, typename AddItem>
+Rows RowPerItem(const Row& message, const Items& items, const AddItem& add) {
+  Rows rows;
+  for (const auto& item : items) {
+    rows.push_back(message);
+    add(rows.back(), item);
+  }
+  return rows;
+}
+
 Rows ToRows(const image_part_t& m) {
   return {Begin(m.utime)
               .Add("sequence", m.sequence)
@@ -91,12 +106,9 @@ Rows ToRows(const mount_state_t& m) {
               .Add("T_mount_camera", m.T_mount_camera)};
 }
 Rows ToRows(const mount_command_t& m) {
-  Rows rows;
-  for (const auto& waypoint : m.waypoints) {
-    rows.push_back(
-        Begin(m.utime).Add("command_id", m.command_id).Add("time_s", waypoint.time_s).Add("T_world_mount", waypoint.T_world_mount));
-  }
-  return rows;
+  return RowPerItem(Begin(m.utime).Add("command_id", m.command_id), m.waypoints, [](Row& row, const auto& waypoint) {
+    row.Add("time_s", waypoint.time_s).Add("T_world_mount", waypoint.T_world_mount);
+  });
 }
 Rows ToRows(const track_t& m) {
   return {Begin(m.utime)
@@ -133,30 +145,26 @@ Rows ToRows(const view_t& m) {
 Rows ToRows(const scene_t& m) {
   Rows rows;
   for (const auto& hull : m.hulls) {
-    for (const auto& point : hull.points) {
-      rows.push_back(
-          Begin(m.utime).Add("object", m.object).Add("hull", hull.name).Add("x", point[0]).Add("y", point[1]).Add("z", point[2]));
-    }
+    const Rows of_hull =
+        RowPerItem(Begin(m.utime).Add("object", m.object).Add("hull", hull.name), hull.points,
+                   [](Row& row, const auto& point) { row.Add("x", point[0]).Add("y", point[1]).Add("z", point[2]); });
+    rows.insert(rows.end(), of_hull.begin(), of_hull.end());
   }
   return rows;
 }
 Rows ToRows(const detections_t& m) {
-  Rows rows;
-  for (const auto& d : m.detections) {
-    rows.push_back(Begin(m.utime)
-                       .Add("sequence", m.sequence)
-                       .Add("object", d.object)
-                       .Add("probability", d.probability)
-                       .Add("confidence", d.confidence)
-                       .Add("support", std::int64_t{d.support})
-                       .Add("visible", std::int64_t{d.visible})
-                       .Add("view", std::int64_t{d.view})
-                       .Add("inliers", std::int64_t{d.inliers})
-                       .Add("source", d.source)
-                       .Add("process_ms", m.process_ms)
-                       .Add("T_camera_object", d.T_camera_object));
-  }
-  return rows;
+  return RowPerItem(Begin(m.utime).Add("sequence", m.sequence), m.detections, [&](Row& row, const auto& d) {
+    row.Add("object", d.object)
+        .Add("probability", d.probability)
+        .Add("confidence", d.confidence)
+        .Add("support", std::int64_t{d.support})
+        .Add("visible", std::int64_t{d.visible})
+        .Add("view", std::int64_t{d.view})
+        .Add("inliers", std::int64_t{d.inliers})
+        .Add("source", d.source)
+        .Add("process_ms", m.process_ms)
+        .Add("T_camera_object", d.T_camera_object);
+  });
 }
 Rows ToRows(const measures_t& m) {
   return {Begin(m.utime)
@@ -182,13 +190,31 @@ Rows ToRows(const completeness_t& m) {
               .Add("views", std::int64_t{m.views})};
 }
 Rows ToRows(const reach_t& m) {
-  Rows rows;
-  for (const auto& v : m.viewpoints) {
-    Row row = Begin(m.utime).Add("object", m.object);
+  return RowPerItem(Begin(m.utime).Add("object", m.object), m.viewpoints, [](Row& row, const auto& v) {
     for (int i = 0; i < 3; ++i) row.Add(std::string("direction_") + "xyz"[i], v.viewpoint.direction[i]);
-    rows.push_back(row.Add("distance_m", v.viewpoint.distance_m).Add("weight", v.weight));
-  }
-  return rows;
+    row.Add("distance_m", v.viewpoint.distance_m).Add("weight", v.weight);
+  });
+}
+Rows ToRows(const host_clock_t& m) {
+  return RowPerItem(Begin(m.utime).Add("host", m.host), m.echoes, [](Row& row, const auto& echo) {
+    row.Add("other_host", echo.host).Add("sent_us", echo.sent_us).Add("received_us", echo.received_us);
+  });
+}
+Rows ToRows(const store_list_t& m) {
+  return RowPerItem(Begin(m.utime).Add("host", m.host), m.entries,
+                    [](Row& row, const auto& entry) { row.Add("object", entry.object).Add("revision", entry.revision); });
+}
+Rows ToRows(const store_query_t& m) {
+  return {Begin(m.utime).Add("request", m.request).Add("object", m.object).Add("views_there", std::int64_t{m.count})};
+}
+Rows ToRows(const store_part_t& m) {
+  return {Begin(m.utime)
+              .Add("request", m.request)
+              .Add("revision", m.revision)
+              .Add("part", std::int64_t{m.part})
+              .Add("parts", std::int64_t{m.parts})
+              .Add("part_bytes", std::int64_t{m.size})
+              .Add("total_bytes", std::int64_t{m.total_size})};
 }
 Rows ToRows(const plan_t& m) {
   Row row = Begin(m.utime)
@@ -273,8 +299,9 @@ LogTables::LogTables(const std::filesystem::path& folder) : folder_(folder) {
 
 bool LogTables::Add(const messaging::LogEvent& event) {
   static const std::map<std::string, Convert> converters =
-      MakeConverters<answer_t, completeness_t, detections_t, image_part_t, measures_t, mount_command_t, mount_state_t,
-                     object_prior_t, operator_command_t, plan_t, query_t, reach_t, scene_t, status_t, track_t, view_t>();
+      MakeConverters<answer_t, completeness_t, detections_t, host_clock_t, image_part_t, measures_t, mount_command_t, mount_state_t,
+                     object_prior_t, operator_command_t, plan_t, query_t, reach_t, scene_t, status_t, store_list_t, store_part_t,
+                     store_query_t, track_t, view_t>();
   const auto converter = converters.find(messaging::TypeOfChannel(event.channel));
   if (converter == converters.end()) return false;
   if (!messaging::WhyRefused(event.channel, event.data.data(), event.data.size()).empty()) return false;
