@@ -19,10 +19,28 @@ constexpr double kInFrontM = 0.015;        // A surface this much nearer hides o
 constexpr double kMinSourceCosine = 0.17;  // Surface the keyframe saw at more than 80 degrees is smeared: as good as unknown.
 constexpr double kMinCosine = 0.05;        // Likewise for the virtual camera.
 
+// The depth (CV_16UC1) with pixels of the mask that have none at the mean of those around them that do: depth registered to the
+// colours of a near object has holes all over.
+cv::Mat WithoutHoles(const cv::Mat& depth, const cv::Mat& mask) {
+  constexpr int kReach = 9;          // Pixels.
+  constexpr double kMinKnown = 0.1;  // Of the pixels within reach.
+  cv::Mat known, sum, share;
+  cv::Mat((depth > 0) & (mask > 0)).convertTo(known, CV_32F, 1.0 / 255.0);
+  depth.convertTo(sum, CV_32F);
+  cv::blur(sum.mul(known), sum, {kReach, kReach});
+  cv::blur(known, share, {kReach, kReach});
+  cv::Mat mean, filled = depth.clone();
+  cv::Mat(sum / share).convertTo(mean, CV_16U);
+  mean.copyTo(filled, (depth == 0) & (mask > 0) & (share >= kMinKnown));
+  return filled;
+}
+
 // Unit normals of the keyframe's depth, camera coordinates, facing the camera; zero where unknown. CV_32FC3.
 cv::Mat NormalMap(const rgbd::Frame& frame, const cv::Mat& mask) {
   const int step = 3;  // Pixels to either side: depth is quantised.
-  const cv::Mat cloud = rgbd::OrganisedCloud(frame);
+  rgbd::Frame whole = frame;
+  whole.depth = WithoutHoles(frame.depth, mask);
+  const cv::Mat cloud = rgbd::OrganisedCloud(whole);
   cv::Mat normals(cloud.size(), CV_32FC3, cv::Scalar::all(0));
   const auto inside = [&](int x, int y) {
     return x >= 0 && y >= 0 && x < cloud.cols && y < cloud.rows && mask.at<std::uint8_t>(y, x);

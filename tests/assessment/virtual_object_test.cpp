@@ -83,6 +83,22 @@ TEST(VirtualObject, FromTheLearnedPoseItLooksAsItDid) {
   EXPECT_LT(mean[0] + mean[1] + mean[2], 3.0 * 2.5);
 }
 
+TEST(VirtualObject, DepthThatIsHalfHolesShowsNearlyAllOfIt) {
+  model::ObjectModel object = FlatObject();
+  const model::View& view = object.views[0];
+  const int whole = cv::countNonZero(VirtualObject(object).Render(view.keyframe.camera, view.T_camera_object).mask);
+  // As depth registered to the colours of a near object.
+  cv::RNG random(5);
+  cv::Mat& depth = object.views[0].keyframe.depth;
+  for (int y = 0; y < depth.rows; ++y) {
+    for (int x = 0; x < depth.cols; ++x) {
+      if (random.uniform(0, 2) == 0) depth.at<std::uint16_t>(y, x) = 0;
+    }
+  }
+  const int with_holes = cv::countNonZero(VirtualObject(object).Render(view.keyframe.camera, view.T_camera_object).mask);
+  EXPECT_GT(with_holes, 0.8 * whole);
+}
+
 TEST(VirtualObject, TurnedAwayItIsForeshortenedAndFromBehindNotThere) {
   const model::ObjectModel object = FlatObject();
   const VirtualObject surface(object);
