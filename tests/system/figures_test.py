@@ -45,7 +45,10 @@ def recognition(folder):
 
 
 def completeness():
-    """How views combine, on the photographs of `board`: the default rule says how often models of 1 to 16 views are detected."""
+    """How views combine, on the photographs of `board`: the default rule says how often models of 1 to 16 views are detected.
+
+    Six splits do not tell max from common_cause (errors of a split have an SD of .05 to .1), but the others from both.
+    """
     figures = vantage("evaluate", "completeness", "--sequence", DATA / "board", "--object-id", 3, "--quick")
     rules = ("max", "common_cause", "noisy_or", "clipped_sum")
     for of in figures["views"]:
@@ -53,9 +56,10 @@ def completeness():
         print(of["views"], "views:", of["detection_rate"], {rule: round(of[rule]["difference"], 3) for rule in rules}, flush=True)
         check(default, "difference", abs(default["difference"]) <= 0.08)
     check(figures, "views", len(figures["views"]) == 5)
-    best = min(rules, key=lambda rule: sum(of[rule]["brier_score"] for of in figures["views"]))
-    if best != "common_cause":
-        sys.exit(f"figures: single looks are foretold best by {best}, not by the default rule")
+    brier = {rule: sum(of[rule]["brier_score"] for of in figures["views"]) / 5 for rule in rules}
+    print("Brier score of single looks:", brier, flush=True)
+    if brier["common_cause"] > min(brier.values()) + 0.005 or brier["common_cause"] > min(brier["noisy_or"], brier["clipped_sum"]):
+        sys.exit("figures: another rule foretells single looks better than the default one")
 
 
 def main():
