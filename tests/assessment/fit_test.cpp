@@ -87,11 +87,11 @@ TEST(FitMeasures, WhatViewsDoTogetherTellsHowFarTheyFailTogether) {
     if (trial.object_shown) trial.others = {{trial.rotation_rad, trial.log2_scale}};
   }
   const double together = FitMeasures(trials, {}).predicted.common_cause();  // Two views do no better than one.
-  EXPECT_GT(together, 0.8);
+  EXPECT_GT(together, measures::PredictedSuccess::kDefaultCommonCause + 0.05);
   for (Trial& trial : trials) {
     if (trial.object_shown && trial.rotation_rad < 45.0 * kDegree) trial.together.assign(1, {0.6, true});
   }
-  EXPECT_LT(FitMeasures(trials, {}).predicted.common_cause(), together - 0.3);
+  EXPECT_LT(FitMeasures(trials, {}).predicted.common_cause(), measures::PredictedSuccess::kDefaultCommonCause - 0.05);
 }
 
 TEST(FitMeasures, NoTrialsGiveTheDefault) {

@@ -11,7 +11,8 @@ namespace vantage::exploration {
 
 inline constexpr double kDegree = M_PI / 180.0;
 
-// Detection falls from 1 to 0 between `sure_deg` and `hopeless_deg` off the learned direction, whatever the scale.
+// Detection falls from 1 to 0 between `sure_deg` and `hopeless_deg` off the learned direction, whatever the scale; all views fail
+// of the same causes.
 inline measures::PredictedSuccess Falling(double sure_deg = 10.0, double hopeless_deg = 45.0) {
   using measures::PredictedSuccess;
   std::vector<double> trials(PredictedSuccess::kRotationCells * PredictedSuccess::kScaleCells, 1e6), successes(trials);
@@ -19,7 +20,9 @@ inline measures::PredictedSuccess Falling(double sure_deg = 10.0, double hopeles
     const double degrees = 5.0 * (static_cast<double>(i / PredictedSuccess::kScaleCells) + 0.5);
     successes[i] *= std::clamp((hopeless_deg - degrees) / (hopeless_deg - sure_deg), 0.0, 1.0);
   }
-  return PredictedSuccess::FromCounts(trials, successes, measures::Source::kOwn);
+  auto predicted = PredictedSuccess::FromCounts(trials, successes, measures::Source::kOwn);
+  predicted.set_common_cause(1.0);
+  return predicted;
 }
 
 inline Eigen::Vector3d Direction(double azimuth_deg, double elevation_deg = 0.0) {
