@@ -37,24 +37,12 @@ KDL::Chain ToChain(const ArmModel& arm) {
   return chain;
 }
 
-}  // namespace
-
-struct ArmIk::Impl {
-  std::shared_ptr<const ArmModel> arm;
-  KDL::Chain chain;
-};
-
-ArmIk::ArmIk(std::shared_ptr<const ArmModel> arm) : impl_(std::make_unique<Impl>()) {
-  impl_->chain = ToChain(*arm);
-  impl_->arm = std::move(arm);
-}
-
-ArmIk::~ArmIk() = default;
-
-std::optional<Eigen::VectorXd> ArmIk::SolveFrom(const geometry::Rigid& T_world_camera, const Eigen::VectorXd& start_rad) const {
-  const ArmModel& arm = *impl_->arm;
-  KDL::ChainFkSolverPos_recursive position(impl_->chain);
-  KDL::ChainJntToJacSolver rates(impl_->chain);
+// See ArmIk::SolveFrom. A chain of the caller's own: KDL's joints keep the last pose asked for, const or not, so threads must not
+// share one.
+std::optional<Eigen::VectorXd> SolveWith(const KDL::Chain& chain, const ArmModel& arm, const geometry::Rigid& T_world_camera,
+                                         const Eigen::VectorXd& start_rad) {
+  KDL::ChainFkSolverPos_recursive position(chain);
+  KDL::ChainJntToJacSolver rates(chain);
   KDL::JntArray joints(static_cast<unsigned>(arm.joints()));
   KDL::Jacobian jacobian(static_cast<unsigned>(arm.joints()));
   joints.data = start_rad;
@@ -99,6 +87,24 @@ std::optional<Eigen::VectorXd> ArmIk::SolveFrom(const geometry::Rigid& T_world_c
   return std::nullopt;
 }
 
+}  // namespace
+
+struct ArmIk::Impl {
+  std::shared_ptr<const ArmModel> arm;
+  KDL::Chain chain;
+};
+
+ArmIk::ArmIk(std::shared_ptr<const ArmModel> arm) : impl_(std::make_unique<Impl>()) {
+  impl_->chain = ToChain(*arm);
+  impl_->arm = std::move(arm);
+}
+
+ArmIk::~ArmIk() = default;
+
+std::optional<Eigen::VectorXd> ArmIk::SolveFrom(const geometry::Rigid& T_world_camera, const Eigen::VectorXd& start_rad) const {
+  return SolveWith(KDL::Chain(impl_->chain), *impl_->arm, T_world_camera, start_rad);
+}
+
 std::vector<Eigen::VectorXd> ArmIk::Solve(const geometry::Rigid& T_world_camera) const {
   const ArmModel& arm = *impl_->arm;
   const Eigen::Vector3d place = T_world_camera.translation(), axis = T_world_camera.linear().col(2);
@@ -112,8 +118,9 @@ std::vector<Eigen::VectorXd> ArmIk::Solve(const geometry::Rigid& T_world_camera)
   std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(seeds), nearest.end(),
                     [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<Eigen::VectorXd> solutions;
+  const KDL::Chain chain = impl_->chain;
   for (std::size_t i = 0; i < seeds; ++i) {
-    const auto solution = SolveFrom(T_world_camera, nearest[i].second->joints_rad);
+    const auto solution = SolveWith(chain, arm, T_world_camera, nearest[i].second->joints_rad);
     if (!solution) continue;
     const bool known = std::any_of(solutions.begin(), solutions.end(), [&](const Eigen::VectorXd& other) {
       return (other - *solution).cwiseAbs().maxCoeff() < kDifferent_rad;
