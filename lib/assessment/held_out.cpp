@@ -94,6 +94,22 @@ std::vector<ViewTrial> TryViewsAlone(const model::ObjectModel& object, const Tru
   return trials;
 }
 
+bool IsDetected(const ViewTrial& trial, const measures::ObservedSuccess& observed) {
+  return trial.right && observed.Probability(trial.confidence) >= 0.5;
+}
+
+measures::ObservedSuccess FitObserved(const std::vector<HeldOutHypothesis>& hypotheses) {
+  std::vector<measures::ConfidenceSample> samples;
+  for (const HeldOutHypothesis& hypothesis : hypotheses) samples.push_back({hypothesis.confidence, hypothesis.right});
+  return measures::ObservedSuccess::Fit(samples, measures::Source::kOwn);
+}
+
+measures::PredictedSuccess FitPredicted(const std::vector<ViewTrial>& trials, const measures::ObservedSuccess& observed) {
+  std::vector<measures::PredictionSample> samples;
+  for (const ViewTrial& trial : trials) samples.push_back({trial.rotation_rad, trial.log2_scale, IsDetected(trial, observed)});
+  return measures::PredictedSuccess::Fit(samples, measures::Source::kOwn);
+}
+
 std::vector<measures::JointSample> Looks(const model::ObjectModel& object, const std::vector<HeldOutHypothesis>& hypotheses,
                                          const std::vector<HeldOutFrame>& frames, const Truth& truth) {
   std::vector<bool> detected(frames.size(), false);

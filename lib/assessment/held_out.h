@@ -58,6 +58,11 @@ std::vector<HeldOutHypothesis> Hypotheses(const std::shared_ptr<const model::Obj
 std::vector<ViewTrial> TryViewsAlone(const model::ObjectModel& object, const Truth& truth, const std::vector<HeldOutFrame>& frames,
                                      const recognition::RecogniserParams& recogniser);
 
+// The measures that such frames say are true: p(o|c) from hypotheses, p(o|theta) from views alone, detected by that p(o|c).
+bool IsDetected(const ViewTrial& trial, const measures::ObservedSuccess& observed);  // Right, and p(o|c) >= 1/2.
+measures::ObservedSuccess FitObserved(const std::vector<HeldOutHypothesis>& hypotheses);
+measures::PredictedSuccess FitPredicted(const std::vector<ViewTrial>& trials, const measures::ObservedSuccess& observed);
+
 // Every frame that counts: what the object's views together predict for it by the object's measures, and whether its most likely
 // hypothesis is right and has p(o|c) >= 1/2.
 std::vector<measures::JointSample> Looks(const model::ObjectModel& object, const std::vector<HeldOutHypothesis>& hypotheses,

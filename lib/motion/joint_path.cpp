@@ -7,6 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "motion/path_timing.h"
+
 namespace vantage::motion {
 namespace {
 
@@ -122,25 +124,6 @@ double LargestChange(const Cell& cell, double squared_rate, const JointLimits& l
   return largest;
 }
 
-std::vector<double> SquaredRates(const std::vector<Piece>& pieces, const std::vector<Cell>& cells, const JointLimits& limits) {
-  std::vector<double> rates(cells.size() + 1, 1.0);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const double cap = SquaredRateCap(cells[i], limits);
-    rates[i] = std::min(rates[i], cap);
-    rates[i + 1] = std::min(rates[i + 1], cap);
-    const bool ends_piece = i + 1 == cells.size() || cells[i + 1].piece != cells[i].piece;
-    if (ends_piece && pieces[cells[i].piece].stop_at_end) rates[i + 1] = 0.0;
-  }
-  rates.front() = rates.back() = 0.0;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    rates[i + 1] = std::min(rates[i + 1], rates[i] + 2.0 * cells[i].length_s * LargestChange(cells[i], rates[i], limits, 1.0));
-  }
-  for (std::size_t i = cells.size(); i-- > 0;) {
-    rates[i] = std::min(rates[i], rates[i + 1] + 2.0 * cells[i].length_s * LargestChange(cells[i], rates[i + 1], limits, -1.0));
-  }
-  return rates;
-}
-
 }  // namespace
 
 std::vector<TimedJoints> TimeJointPath(const std::vector<Joints>& polyline, const JointLimits& limits, double corner_cut_m) {
@@ -149,23 +132,14 @@ std::vector<TimedJoints> TimeJointPath(const std::vector<Joints>& polyline, cons
   if (segments.empty()) return {{0.0, polyline.front()}};
   const std::vector<Piece> pieces = MakePieces(segments, limits, corner_cut_m);
   const std::vector<Cell> cells = MakeCells(pieces);
-  const std::vector<double> rates = SquaredRates(pieces, cells, limits);
-  std::vector<double> times(cells.size() + 1, 0.0);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    times[i + 1] = times[i] + 2.0 * cells[i].length_s / (std::sqrt(rates[i]) + std::sqrt(rates[i + 1]));
-  }
-  const int intervals = std::max(1, static_cast<int>(std::ceil(times.back() / kLongestInterval_s - 1e-9)));
+  const std::vector<double> rates = SquaredRates(
+      pieces, cells, [&](const Cell& cell) { return SquaredRateCap(cell, limits); },
+      [&](const Cell& cell, double squared_rate, double sign) { return LargestChange(cell, squared_rate, limits, sign); });
   std::vector<TimedJoints> path{{0.0, polyline.front()}};
-  std::size_t i = 0;
-  for (int k = 1; k < intervals; ++k) {
-    const double time_s = times.back() * k / intervals;
-    while (i + 1 < cells.size() && times[i + 1] <= time_s) ++i;
-    const double since_s = time_s - times[i];
-    const double change = (rates[i + 1] - rates[i]) / (2.0 * cells[i].length_s);
-    const double u = cells[i].begin_s + std::sqrt(rates[i]) * since_s + change * since_s * since_s / 2.0;
-    path.push_back({time_s, pieces[cells[i].piece].At(u)});
-  }
-  path.push_back({times.back(), polyline.back()});
+  const double end_s = SampleEvenly(cells, rates, kLongestInterval_s, [&](double time_s, const Cell& cell, double u) {
+    path.push_back({time_s, pieces[cell.piece].At(u)});
+  });
+  path.push_back({end_s, polyline.back()});
   return path;
 }
 

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "motion/path_timing.h"
+
 namespace vantage::motion {
 namespace {
 
@@ -161,46 +163,13 @@ double LargestChange(const Cell& cell, double squared_rate, const SpeedLimits& l
   return std::min(linear, angular);
 }
 
-// (du/dt)^2 at the borders of the cells: as fast as the limits allow.
-std::vector<double> SquaredRates(const std::vector<Piece>& pieces, const std::vector<Cell>& cells, const SpeedLimits& limits) {
-  std::vector<double> rates(cells.size() + 1, 1.0);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const double cap = SquaredRateCap(cells[i], limits);
-    rates[i] = std::min(rates[i], cap);
-    rates[i + 1] = std::min(rates[i + 1], cap);
-    const bool ends_piece = i + 1 == cells.size() || cells[i + 1].piece != cells[i].piece;
-    if (ends_piece && pieces[cells[i].piece].stop_at_end) rates[i + 1] = 0.0;
-  }
-  rates.front() = rates.back() = 0.0;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    rates[i + 1] = std::min(rates[i + 1], rates[i] + 2.0 * cells[i].length_s * LargestChange(cells[i], rates[i], limits, 1.0));
-  }
-  for (std::size_t i = cells.size(); i-- > 0;) {
-    rates[i] = std::min(rates[i], rates[i + 1] + 2.0 * cells[i].length_s * LargestChange(cells[i], rates[i + 1], limits, -1.0));
-  }
-  return rates;
-}
-
-// Waypoints at even times; within a cell (du/dt)^2 is linear in u, so d2u/dt2 is constant.
 Trajectory Sample(const std::vector<Piece>& pieces, const std::vector<Cell>& cells, const std::vector<double>& rates) {
-  std::vector<double> times(cells.size() + 1, 0.0);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    times[i + 1] = times[i] + 2.0 * cells[i].length_s / (std::sqrt(rates[i]) + std::sqrt(rates[i + 1]));
-  }
-  const int intervals = std::max(1, static_cast<int>(std::ceil(times.back() / kLongestInterval_s - 1e-9)));
   Trajectory trajectory;
-  trajectory.waypoints.reserve(static_cast<std::size_t>(intervals) + 1);
   trajectory.waypoints.push_back({0.0, pieces.front().from});
-  std::size_t i = 0;
-  for (int k = 1; k < intervals; ++k) {
-    const double time_s = times.back() * k / intervals;
-    while (i + 1 < cells.size() && times[i + 1] <= time_s) ++i;
-    const double since_s = time_s - times[i];
-    const double change = (rates[i + 1] - rates[i]) / (2.0 * cells[i].length_s);
-    const double u = cells[i].begin_s + std::sqrt(rates[i]) * since_s + change * since_s * since_s / 2.0;
-    trajectory.waypoints.push_back({time_s, pieces[cells[i].piece].At(u)});
-  }
-  trajectory.waypoints.push_back({times.back(), pieces.back().to});
+  const double end_s = SampleEvenly(cells, rates, kLongestInterval_s, [&](double time_s, const Cell& cell, double u) {
+    trajectory.waypoints.push_back({time_s, pieces[cell.piece].At(u)});
+  });
+  trajectory.waypoints.push_back({end_s, pieces.back().to});
   return trajectory;
 }
 
@@ -243,7 +212,10 @@ Trajectory TimePath(const std::vector<Rigid>& poses, const SpeedLimits& limits, 
   if (segments.empty()) return Trajectory{{Waypoint{0.0, poses.front()}}};
   const std::vector<Piece> pieces = MakePieces(segments, limits, corner_cut_m);
   const std::vector<Cell> cells = MakeCells(pieces);
-  return Sample(pieces, cells, SquaredRates(pieces, cells, limits));
+  const std::vector<double> rates = SquaredRates(
+      pieces, cells, [&](const Cell& cell) { return SquaredRateCap(cell, limits); },
+      [&](const Cell& cell, double squared_rate, double sign) { return LargestChange(cell, squared_rate, limits, sign); });
+  return Sample(pieces, cells, rates);
 }
 
 }  // namespace vantage::motion

@@ -190,6 +190,7 @@ void RunReport(const AssessOptions& options) {
   if (failed) throw std::runtime_error(options.report + ": cannot be made: " + failed.message());
   Report report;
   report.recogniser = params.recogniser;
+  report.observed_fit = params.trials.observed_fit;
   for (const std::string& name : NamesToAssess(options, store)) {
     const std::optional<model::ObjectModel> object = store.Load(name);
     if (!object || object->views.empty()) continue;

@@ -66,7 +66,7 @@ ByFrame ObservedForecasts(const Models& models, double prior) {
 }
 
 bool IsDetected(const JudgedModel& model, const assessment::ViewTrial& trial) {
-  return trial.right && model.measures.observed.Probability(trial.confidence) >= 0.5;
+  return assessment::IsDetected(trial, model.measures.observed);
 }
 
 double Predicted(const JudgedModel& model, const assessment::ViewTrial& trial) {

@@ -61,10 +61,8 @@ class Photographs {
     auto object = std::make_shared<model::ObjectModel>(all_.OnlyViews(Indices(offered.begin(), offered.begin() + views)));
     const std::vector<assessment::HeldOutFrame> fit_frames = Frames(fit), judge_frames = Frames(judge);
     const auto hypotheses = assessment::Hypotheses(object, truth_, fit_frames, recogniser_);
-    std::vector<measures::ConfidenceSample> confidences;
-    for (const auto& hypothesis : hypotheses) confidences.push_back({hypothesis.confidence, hypothesis.right});
-    object->measures.observed = measures::ObservedSuccess::Fit(confidences, measures::Source::kOwn);
-    object->measures.predicted = FitPredicted(offered, fit, object->measures.observed);
+    object->measures.observed = assessment::FitObserved(hypotheses);
+    object->measures.predicted = assessment::FitPredicted(Alone(offered, fit), object->measures.observed);
     *common_cause = measures::FitCommonCause(assessment::Looks(*object, hypotheses, fit_frames, truth_));
     object->measures.predicted.set_common_cause(*common_cause);
     return assessment::Looks(*object, assessment::Hypotheses(object, truth_, judge_frames, recogniser_), judge_frames, truth_);
@@ -81,16 +79,13 @@ class Photographs {
     return frames;
   }
 
-  measures::PredictedSuccess FitPredicted(const Indices& views, const Indices& frames,
-                                          const measures::ObservedSuccess& observed) const {
-    std::vector<measures::PredictionSample> samples;
+  std::vector<assessment::ViewTrial> Alone(const Indices& views, const Indices& frames) const {
+    std::vector<assessment::ViewTrial> trials;
     for (const assessment::ViewTrial& trial : alone_) {
       if (std::find(views.begin(), views.end(), trial.view) == views.end()) continue;
-      if (std::find(frames.begin(), frames.end(), trial.frame) == frames.end()) continue;
-      const bool detected = trial.right && observed.Probability(trial.confidence) >= 0.5;
-      samples.push_back({trial.rotation_rad, trial.log2_scale, detected});
+      if (std::find(frames.begin(), frames.end(), trial.frame) != frames.end()) trials.push_back(trial);
     }
-    return measures::PredictedSuccess::Fit(samples, measures::Source::kOwn);
+    return trials;
   }
 
   recognition::RecogniserParams recogniser_;

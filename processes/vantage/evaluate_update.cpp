@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "assessor/worker.h"
+#include "rgbd/bop.h"
 #include "vantage/object_trials.h"
 #include "vantage/truth_judge.h"
 #include "vantage/verb.h"
@@ -19,6 +20,7 @@ namespace {
 struct Options {
   CommonOptions common;
   std::string store;
+  std::string folder;  // The recording it was learned from.
   int images = 10000;
   bool quick = false;
 };
@@ -28,8 +30,9 @@ struct Updates {
   measures::Measures measures;        // After the last.
 };
 
-// View by view, as the views had come one after another.
-Updates Update(const std::string& store, const model::ObjectModel& object, const params::LibraryParams& params) {
+// View by view, as the views had come one after another, each with the whole frame it was learned from: backgrounds come of them.
+Updates Update(const std::string& store, const model::ObjectModel& object, const rgbd::BopScene& scene,
+               const params::LibraryParams& params) {
   assessor::WorkerParams worker_params;
   worker_params.store = store;
   worker_params.recogniser = params.recogniser;
@@ -39,9 +42,10 @@ Updates Update(const std::string& store, const model::ObjectModel& object, const
   assessor::Worker worker(worker_params);
   Updates updates;
   for (std::size_t view = 0; view < object.views.size(); ++view) {
+    const rgbd::Frame frame = scene.Load(static_cast<int>(object.views[view].frame_id));
     const std::clock_t cpu = std::clock();
     const auto wall = std::chrono::steady_clock::now();
-    worker.Start(object.name, object.views[view].keyframe);
+    worker.Start(object.name, frame);
     worker.WaitUntilDone();
     updates.cpu_s.push_back(static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
     updates.wall_s.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count());
@@ -60,8 +64,9 @@ void RunEvaluateUpdate(const Options& options) {
   CheckOutput(options.common);
   const params::LibraryParams params = LoadParams(options.common);
   const model::ObjectModel object = OnlyObjectOf(options.store);
+  const rgbd::BopScene scene(options.folder);
   cv::setNumThreads(1);
-  const Updates updates = Update(options.store, object, params);
+  const Updates updates = Update(options.store, object, scene, params);
   cv::setNumThreads(-1);
   const model::Store store(options.store, model::Store::Mode::kRead);
   auto backgrounds = BackgroundsFor(object, "", store);
@@ -109,6 +114,9 @@ void AddEvaluateUpdate(CLI::App& evaluate, Run& run) {
       "The assessor's work after every new view: seconds of one core, and its measures beside those of --images virtual images");
   AddCommonOptions(*verb, options->common);
   verb->add_option("--store", options->store, "A store with one object")->required()->type_name("FILE");
+  verb->add_option("--sequence", options->folder, "The recording it was learned from: BOP scene folder")
+      ->required()
+      ->type_name("DIR");
   verb->add_option("--images", options->images,
                    "Virtual images of the full result, kept in FILE.trials as vantage assess keeps them")
       ->check(CLI::Range(1, 10000000))

@@ -178,7 +178,8 @@ Rows ToRows(const measures_t& m) {
               .Add("negative_mean", m.negative.mean)
               .Add("negative_sigma", m.negative.sigma)
               .Add("negative_count", std::int64_t{m.negative.count})
-              .Add("predicted_source", m.predicted_source)};
+              .Add("predicted_source", m.predicted_source)
+              .Add("common_cause", m.common_cause)};
 }
 Rows ToRows(const completeness_t& m) {
   return {Begin(m.utime)

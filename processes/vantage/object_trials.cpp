@@ -14,6 +14,15 @@ namespace {
 constexpr std::size_t kMaxBackgrounds = 32;
 constexpr std::size_t kMaxLookAlikes = 4;  // As the assessor process.
 
+// At most kMaxBackgrounds.
+template <typename Value>
+std::vector<Value> EvenlyChosen(const std::vector<Value>& all) {
+  const std::size_t count = std::min(kMaxBackgrounds, all.size());
+  std::vector<Value> chosen;
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(all[i * all.size() / count]);
+  return chosen;
+}
+
 // The folder's images by name; other files are passed over.
 std::vector<cv::Mat> ReadBackgrounds(const std::filesystem::path& folder) {
   if (!std::filesystem::is_directory(folder)) throw std::runtime_error(folder.string() + ": no such folder of background images");
@@ -23,7 +32,7 @@ std::vector<cv::Mat> ReadBackgrounds(const std::filesystem::path& folder) {
   }
   std::sort(files.begin(), files.end());
   std::vector<cv::Mat> images;
-  for (const std::filesystem::path& file : files) {
+  for (const std::filesystem::path& file : EvenlyChosen(files)) {
     cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR);
     if (!image.empty()) images.push_back(std::move(image));
   }
@@ -31,10 +40,18 @@ std::vector<cv::Mat> ReadBackgrounds(const std::filesystem::path& folder) {
   return images;
 }
 
+std::vector<const model::View*> ViewsWithMask(const model::ObjectModel& object) {
+  std::vector<const model::View*> views;
+  for (const model::View& view : object.views) {
+    if (!view.mask.empty()) views.push_back(&view);
+  }
+  return views;
+}
+
 std::vector<cv::Mat> OwnBackgrounds(const model::ObjectModel& object) {
   std::vector<cv::Mat> images;
-  for (const model::View& view : object.views) {
-    if (!view.mask.empty()) images.push_back(assessment::MaskedBackground(view.keyframe.color, view.mask));
+  for (const model::View* view : EvenlyChosen(ViewsWithMask(object))) {
+    images.push_back(assessment::MaskedBackground(view->keyframe.color, view->mask));
   }
   return images;
 }
@@ -78,8 +95,7 @@ std::vector<assessment::Background> BackgroundsFor(const model::ObjectModel& obj
                                                    const model::Store& store) {
   const std::vector<cv::Mat> images = folder.empty() ? OwnBackgrounds(object) : ReadBackgrounds(folder);
   std::vector<assessment::Background> backgrounds;
-  const std::size_t count = std::min(kMaxBackgrounds, images.size());
-  for (std::size_t i = 0; i < count; ++i) backgrounds.push_back({images[i * images.size() / count], nullptr});
+  for (const cv::Mat& image : images) backgrounds.push_back({image, nullptr});
   // Spread out: only so many backgrounds are tried as negatives.
   std::size_t place = 1;
   for (const cv::Mat& image : LookAlikes(object, images, store)) {

@@ -178,7 +178,7 @@ measures::Measures FitWhere(const Report& report, const std::vector<assessment::
   for (const assessment::Trial& trial : trials) {
     if (!trial.object_shown || taken(trial)) some.push_back(trial);
   }
-  return assessment::FitMeasures(some, report.recogniser);
+  return assessment::FitMeasures(some, report.recogniser, report.observed_fit);
 }
 
 measures::Measures FitAt(const Report& report, std::vector<assessment::Trial> trials, double correct_m) {
@@ -186,20 +186,13 @@ measures::Measures FitAt(const Report& report, std::vector<assessment::Trial> tr
     for (assessment::Proposal& proposal : trial.alone) proposal.correct = proposal.error_m < correct_m;
     for (assessment::Proposal& proposal : trial.together) proposal.correct = proposal.error_m < correct_m;
   }
-  return assessment::FitMeasures(trials, report.recogniser);
+  return assessment::FitMeasures(trials, report.recogniser, report.observed_fit);
 }
 
 measures::Measures FitTruth(const ReportTruth& truth) {
   measures::Measures measures;
-  std::vector<measures::ConfidenceSample> confidences;
-  for (const auto& hypothesis : truth.hypotheses) confidences.push_back({hypothesis.confidence, hypothesis.right});
-  measures.observed = measures::ObservedSuccess::Fit(confidences, measures::Source::kOwn);
-  std::vector<measures::PredictionSample> predictions;
-  for (const assessment::ViewTrial& trial : truth.view_trials) {
-    const bool detected = trial.right && measures.observed.Probability(trial.confidence) >= 0.5;
-    predictions.push_back({trial.rotation_rad, trial.log2_scale, detected});
-  }
-  measures.predicted = measures::PredictedSuccess::Fit(predictions, measures::Source::kOwn);
+  measures.observed = assessment::FitObserved(truth.hypotheses);
+  measures.predicted = assessment::FitPredicted(truth.view_trials, measures.observed);
   return measures;
 }
 

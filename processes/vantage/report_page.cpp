@@ -40,7 +40,7 @@ class Script {
   void Figure(const std::string& name, int panels) {
     Close();
     plots_ << "set terminal pngcairo size " << kPanelPx * panels << ',' << kPanelPx << "\nset output '" << name
-           << ".png'\nset multiplot layout 1," << panels << "\nset grid\n";
+           << ".png'\nset multiplot layout 1," << panels << "\nset grid\nset key samplen 1 font ',8'\n";
     open_ = true;
   }
   void Panel(const std::string& title, const std::string& settings, const std::vector<std::string>& plots) {
@@ -228,7 +228,7 @@ void PlotReliability(const Report& report, const ReportObject& object, Script* s
     observed.push_back({object.measures.observed.Probability(hypothesis.confidence), hypothesis.right});
   }
   for (const assessment::ViewTrial& trial : report.truth->view_trials) {
-    const bool detected = trial.right && object.measures.observed.Probability(trial.confidence) >= 0.5;
+    const bool detected = assessment::IsDetected(trial, object.measures.observed);
     predicted.push_back({object.measures.predicted.Probability(trial.rotation_rad, trial.log2_scale), detected});
   }
   const std::string axes = "set xrange [0:1]\nset yrange [0:1]\nset ylabel 'share that was right'\nset key top left\nset xlabel ";

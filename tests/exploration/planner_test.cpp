@@ -44,6 +44,7 @@ TEST(Planner, EveryCandidateCarriesItsOwnReasons) {
     params.rule = rule;
     params.max_path_goals = 3;
     Belief belief = BeliefFrom({ring[0], ring[5], ring[30]}, ring);
+    belief.predicted.set_common_cause(0.4);  // No two rules are the same.
     for (std::size_t i = 0; i < belief.reachable.size(); ++i) belief.reachable[i].weight = static_cast<double>(i % 4);
     const Decision decision = MakeStrategy("planner", params, 0)->Decide(belief, ring, ring[2].T_world_camera, mount, 0.0);
     ASSERT_EQ(decision.candidates.size(), ring.size());

@@ -20,6 +20,7 @@ ObjectMeasures SomeMeasures(measures::ObservedFit fit = measures::ObservedFit::k
       measures::ObservedSuccess::Fit({{0.7, true}, {0.8, true}, {0.1, false}, {0.2, false}}, measures::Source::kOwn, 10.0, fit);
   measures.measures.predicted =
       measures::PredictedSuccess::Fit({{0.1, 0.0, true}, {0.9, 0.3, false}, {0.4, -0.3, true}}, measures::Source::kOwn);
+  measures.measures.predicted.set_common_cause(0.3);
   return measures;
 }
 
@@ -32,6 +33,7 @@ TEST(AssessorMessages, MeasuresEvaluateTheSameAfterTheWire) {
   EXPECT_EQ(back->object, "mug");
   EXPECT_EQ(back->measures.fingerprint, "sift;4");
   EXPECT_EQ(back->measures.observed.source(), measures::Source::kOwn);
+  EXPECT_EQ(back->measures.predicted.common_cause(), 0.3);
   for (double x = 0.0; x <= 1.0; x += 0.05) {
     EXPECT_DOUBLE_EQ(back->measures.observed.Probability(x), measures.measures.observed.Probability(x));
     EXPECT_DOUBLE_EQ(back->measures.predicted.Probability(x, x - 0.5), measures.measures.predicted.Probability(x, x - 0.5));
@@ -62,6 +64,9 @@ TEST(AssessorMessages, MeasuresOutOfRangeAreRefused) {
   EXPECT_FALSE(FromMessage(bad));
   bad = good;
   bad.predicted_source = "hearsay";
+  EXPECT_FALSE(FromMessage(bad));
+  bad = good;
+  bad.common_cause = std::nan("");
   EXPECT_FALSE(FromMessage(bad));
   bad = good;
   bad.trials.pop_back();
