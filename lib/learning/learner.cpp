@@ -16,7 +16,8 @@
 namespace vantage::learning {
 namespace {
 
-constexpr double kSeen = 0.5;  // p(o|c) from which a pose counts as the object's.
+constexpr double kSeen = 0.5;        // p(o|c) from which a pose counts as the object's.
+constexpr int kWholeImageEvery = 3;  // Frames.
 
 // Where depth must not help to place the object in a frame it must not help to refine views either.
 LearnerParams WithoutDepthWhereNotWanted(LearnerParams params) {
@@ -63,6 +64,8 @@ struct Learner::Impl {
   int confirmations = 0;  // Frames that agreed since the object was found again.
   int reference_view = -1;
   Motion motion;
+  std::optional<geometry::Rigid> seen_last;  // Its pose in the last frame it was found in.
+  int lost_frames = 0;                       // Searched by the whole model since.
   MountWitness mount;
   std::optional<segmentation::Plane> plane;
   std::vector<segmentation::Cluster> clusters;
@@ -158,12 +161,16 @@ struct Learner::Impl {
     if (!predicted && !mount_pose) return std::nullopt;
     Expectation expectation;
     expectation.T_camera_object = mount_pose ? *mount_pose : *predicted;
-    const double distance = std::max(0.05, expectation.T_camera_object.translation().norm());
-    const double size_px = frame.camera.fx * Size() / distance;
+    const double size_px = Size_px(frame, expectation.T_camera_object);
     expectation.steady = !mount_pose && motion.IsSteady(frame.utime);
     expectation.margin_px =
         expectation.steady ? std::max(params.min_roi_margin_px, 3.0 * motion.error_px()) : params.roi_margin * size_px + 20.0;
     return expectation;
+  }
+
+  // How large it looks.
+  double Size_px(const rgbd::Frame& frame, const geometry::Rigid& T_camera_object) const {
+    return frame.camera.fx * Size() / std::max(0.05, T_camera_object.translation().norm());
   }
 
   // The longest side of the box around the model's points, metres.
@@ -226,9 +233,17 @@ struct Learner::Impl {
     return held && IsGood(frame, found.track) ? std::optional<Found>(found) : std::nullopt;
   }
 
-  // By the whole model, anywhere in the image.
+  // By the whole model: about where it was seen last, which is quick; every few frames, and where it never was, anywhere in the
+  // image.
   std::optional<Track> Relocalise(const rgbd::Frame& frame) {
-    const features::Features features = CurrentRecogniser().Extract(frame);
+    if (motion.last()) {  // It was found in the last frame.
+      seen_last = motion.last();
+      lost_frames = 0;
+    }
+    const bool near = seen_last && ++lost_frames % kWholeImageEvery != 0;
+    const features::Features features =
+        near ? tracker.ExtractAround(*object, frame, {*seen_last, 0.5 * Size_px(frame, *seen_last), false})
+             : CurrentRecogniser().Extract(frame);
     const auto detections = CurrentRecogniser().Recognise(frame, features);
     if (detections.empty()) return std::nullopt;
     Track track = tracker.At(*object, frame, features, detections.front().T_camera_object, true, mount.PoseIn(frame));

@@ -304,13 +304,9 @@ void AddEvaluateLearner(CLI::App& evaluate, Run& run) {
       ->needs(folder);
   verb->add_flag("--no-query-depth", sequence.no_query_depth, "With --sequence: views are placed by their colour images only")
       ->needs(folder);
-  verb->add_option(
-          "--witness-gap", sequence.witness_gap,
-          "With --sequence: hold recorded and tracked poses against the camera's motion over so many frames as the background's "
-          "surface and texture show it")
-      ->check(CLI::Range(1, 10000))
-      ->needs(folder)
-      ->type_name("N");
+  verb->add_flag("--witness", sequence.witness,
+                 "With --sequence: hold recorded and tracked poses against a bundle adjustment of all that the images show")
+      ->needs(folder);
   verb->add_option("--start-azimuth", options->start_azimuth_deg,
                    "Where the camera begins, degrees about z from x (default: before the object's broadest side)")
       ->type_name("DEG");

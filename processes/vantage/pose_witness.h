@@ -1,5 +1,4 @@
-// Holds camera poses against what a recording's own pictures show beside the object: where a recorded pose and a tracked one
-// disagree, which of the two is off?
+// Holds camera poses against what a recording's own pictures say: where recorded poses and tracked ones disagree, which are off?
 #pragma once
 
 #include <string>
@@ -17,12 +16,13 @@ struct WitnessedFrame {
   geometry::Rigid T_camera_object = geometry::Rigid::Identity();
 };
 
-// The witness is the camera's motion between frames `gap` apart in the list as the background shows it (the outline of
-// `points_in_object`, widened, is left out): interest points start it, then one frame's surface and texture are fitted to the
-// other's images, which knows neither opinion. Fitted there and back it says how far it is to be trusted itself: "own".
-// {"gap", "pairs", "own", "recorded", "tracked", "each_other"}, errors as ErrorFigures. Cost: about a second a frame.
-Json WitnessFigures(const std::vector<WitnessedFrame>& frames, const Eigen::Matrix3Xd& points_in_object,
-                    const learning::LearnerParams& params, int gap);
+// The witness is a bundle adjustment of all that the whole images show, the object and everything about it: interest points matched
+// over 1 to 34 frames, their pixels and measured depths. It knows neither opinion (it starts from a chain of matched frames). All
+// are compared by where they put a camera seen from the first frame's; adjusted twice more with either half of the points, the
+// witness says how far it is to be trusted itself.
+// {"points", "rms_px", "own", "recorded", "tracked", "each_other"}, errors as ErrorFigures; null where the pictures do not hang
+// together. Cost: about half a second a frame.
+Json WitnessFigures(const std::vector<WitnessedFrame>& frames, const learning::LearnerParams& params);
 
 // The figures for people.
 std::string WitnessSummary(const Json& figures);

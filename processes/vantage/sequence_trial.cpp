@@ -61,7 +61,7 @@ class SequenceRun {
       const geometry::Rigid T_camera_world = frame.T_world_camera->inverse();
       frames.push_back({std::move(frame), T_camera_world, *step.result.T_camera_object});
     }
-    return WitnessFigures(frames, trial_.learner().object()->PointMatrix(), params, options_.witness_gap);
+    return WitnessFigures(frames, params);
   }
 
   const LearnerTrial& trial() const { return trial_; }
@@ -120,7 +120,7 @@ Json TrySequence(const SequenceTrialOptions& options, learning::LearnerParams pa
   result["query_depth"] = params.recogniser.use_query_depth;
   result.update(FiguresOf(run.trial()));
   if (!options.find.empty()) result["found"] = run.Find(params.recogniser);
-  if (options.witness_gap > 0) result["witness"] = run.Witness(params);
+  if (options.witness) result["witness"] = run.Witness(params);
   if (!save.empty()) SaveTrial(run.trial(), run.name(), save);
   return result;
 }

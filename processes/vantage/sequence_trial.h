@@ -14,7 +14,7 @@ struct SequenceTrialOptions {
   std::string frames = "all";  // As rgbd::SelectFrames.
   int passes = 1;
   std::string find;             // Frames in which the recogniser finds it afterwards; empty = none.
-  int witness_gap = 0;          // The recorded camera poses are judged by the background's motion over so many frames; 0 = not.
+  bool witness = false;         // The recorded camera poses are held against a bundle adjustment of the whole images.
   bool no_query_depth = false;  // Poses are found in colour only. Where depth was rendered at the true poses it would tell them.
 };
 

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include "rgbd/bop.h"
 #include "support/data.h"
 
@@ -58,6 +60,30 @@ TEST(Learner, LosesACoveredObjectLearnsNothingAndFindsItAgain) {
   }
   EXPECT_EQ(learner.object()->views.size(), views);
   EXPECT_EQ(learner.Process(WithoutPose(frames[3])).state, State::kTracking);
+}
+
+// It is sought first about where it was, but not only there.
+TEST(Learner, FindsAgainWhatReturnsElsewhereInTheImage) {
+  VANTAGE_NEEDS_DATA("shelf_box");
+  const auto frames = ShelfFrames(3);
+  Learner learner(LearnerParams{}, "carton");
+  learner.Process(WithoutPose(frames[0]));
+  learner.Process(WithoutPose(frames[1]));
+  rgbd::Frame turned = WithoutPose(frames[2]);  // The camera on its head: what was on the left is on the right.
+  turned.color = turned.depth = cv::Mat();      // Not those of frames[2].
+  const geometry::PinholeCamera& camera = turned.camera;
+  const cv::Matx23d half_turn(-1.0, 0.0, 2.0 * camera.cx, 0.0, -1.0, 2.0 * camera.cy);
+  cv::warpAffine(frames[2].color, turned.color, half_turn, frames[2].color.size(), cv::INTER_NEAREST);
+  cv::warpAffine(frames[2].depth, turned.depth, half_turn, frames[2].depth.size(), cv::INTER_NEAREST);
+  const LearnerResult result = learner.Process(WithoutPose(frames[2]));
+  ASSERT_TRUE(result.T_camera_object) << result.note;
+  const geometry::Rigid before = *result.T_camera_object;
+  ASSERT_LT(camera.Project(before.translation())->x(), camera.cx - 100.0);
+  std::optional<geometry::Rigid> found;
+  for (int i = 0; i < 3 && !found; ++i) found = learner.Process(turned).T_camera_object;
+  ASSERT_TRUE(found);
+  const geometry::Rigid expected(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()) * before);
+  EXPECT_LT(geometry::Difference(*found, expected).translation_m, 0.005);
 }
 
 TEST(Learner, RefusesATrackThatContradictsTheMount) {
