@@ -104,7 +104,7 @@ ArmModel Parse(const std::string& xml, const ArmMountParams& params) {
   arm.T_world_base.linear() = (Eigen::AngleAxisd(params.base_yaw_rad, Eigen::Vector3d::UnitZ()) *
                                Eigen::AngleAxisd(params.base_roll_rad, Eigen::Vector3d::UnitX()))
                                   .toRotationMatrix();
-  arm.T_flange_camera.translation() = params.camera_position_m;
+  arm.T_flange_camera = CameraOnMount(params.camera_position_m, params.camera_rotation_rad);
   arm.reach_m = Reaches(arm);
   arm.postures = SpreadPostures(arm);
   return arm;

@@ -386,6 +386,13 @@ std::unique_ptr<Mount> MakeArmMount(std::shared_ptr<const ArmModel> arm, const O
   return std::make_unique<ArmMount>(std::move(arm), obstacles);
 }
 
+geometry::Rigid CameraOnMount(const Eigen::Vector3d& position_m, const Eigen::Vector3d& rotation_rad) {
+  geometry::Rigid T_mount_camera = geometry::Rigid::Identity();
+  T_mount_camera.linear() = Eigen::AngleAxisd(rotation_rad.norm(), rotation_rad.normalized()).toRotationMatrix();
+  T_mount_camera.translation() = position_m;
+  return T_mount_camera;
+}
+
 void ArmMountParams::Check() const {
   const auto require = [](bool good, const char* field, const char* wanted) {
     if (!good) throw std::invalid_argument(std::string(field) + " must be " + wanted);
@@ -394,6 +401,7 @@ void ArmMountParams::Check() const {
   require(std::isfinite(base_yaw_rad), "base_yaw_rad", "finite");
   require(std::isfinite(base_roll_rad), "base_roll_rad", "finite");
   require(camera_position_m.allFinite(), "camera_position_m", "finite");
+  require(camera_rotation_rad.allFinite(), "camera_rotation_rad", "finite");
   require(clearance_m > kSureClearance_m, "clearance_m", "> 0.008");
   require(max_acceleration_rad_s2 > 0.0, "max_acceleration_rad_s2", "> 0");
   require(ik_seeds >= 1, "ik_seeds", ">= 1");

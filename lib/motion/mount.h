@@ -67,17 +67,22 @@ struct FreeMountParams {
 // Cost: 150 goals on one core, table and 3 hulls, below 0.2 s.
 std::unique_ptr<Mount> MakeFreeMount(const FreeMountParams& params, const Obstacles& obstacles);
 
+// Where a camera sits on its mount, from what a configuration says: T_mount_camera of a camera at `position_m`, turned by
+// `rotation_rad` (axis times angle), both in the mount's axes.
+geometry::Rigid CameraOnMount(const Eigen::Vector3d& position_m, const Eigen::Vector3d& rotation_rad);
+
 struct ArmMountParams {
   std::string urdf;  // File; a serial arm of revolute joints with limits, collision shapes: boxes, cylinders, spheres.
-  Eigen::Vector3d base_position_m{-0.25, 0.0, 1.5};   // World; of the URDF's root link.
-  double base_yaw_rad = 0.0;                          // About the world's z...
-  double base_roll_rad = 3.141592653589793;           // ...after this about its x: pi hangs it over the table.
-  Eigen::Vector3d camera_position_m{0.0, 0.0, 0.06};  // Of the camera on the last link (T_mount_camera); axes are the link's.
-  double clearance_m = 0.02;                          // Kept from obstacles and between links; > 0.008.
-  double max_acceleration_rad_s2 = 1.6;               // Of every joint; > 0. Speeds are the URDF's.
-  int ik_seeds = 12;                                  // Starts of the inverse kinematics for a pose; >= 1.
-  int ik_solutions = 3;                               // Different ones kept of a pose; >= 1.
-  int roadmap_samples = 200;                          // PRM milestones beside start and goals; >= 0.
+  Eigen::Vector3d base_position_m{-0.25, 0.0, 1.5};    // World; of the URDF's root link.
+  double base_yaw_rad = 0.0;                           // About the world's z...
+  double base_roll_rad = 3.141592653589793;            // ...after this about its x: pi hangs it over the table.
+  Eigen::Vector3d camera_position_m{0.0, 0.0, 0.06};   // Of the camera on the last link (T_mount_camera); axes are the link's.
+  Eigen::Vector3d camera_rotation_rad{0.0, 0.0, 0.0};  // How it is turned there: axis times angle, in the link's axes.
+  double clearance_m = 0.02;                           // Kept from obstacles and between links; > 0.008.
+  double max_acceleration_rad_s2 = 1.6;                // Of every joint; > 0. Speeds are the URDF's.
+  int ik_seeds = 12;                                   // Starts of the inverse kinematics for a pose; >= 1.
+  int ik_solutions = 3;                                // Different ones kept of a pose; >= 1.
+  int roadmap_samples = 200;                           // PRM milestones beside start and goals; >= 0.
 
   void Check() const;  // Throws std::invalid_argument naming the field. An empty urdf passes: see MountParams.
 };

@@ -2,6 +2,8 @@
 
 #include <sstream>
 
+#include "common/calibration_file.h"
+
 namespace vantage::params {
 namespace {
 
@@ -279,6 +281,7 @@ void Fields(Visitor& visit, motion::ArmMountParams& params) {
   visit("base_yaw_rad", params.base_yaw_rad);
   visit("base_roll_rad", params.base_roll_rad);
   visit("camera_position_m", params.camera_position_m);
+  visit("camera_rotation_rad", params.camera_rotation_rad);
   visit("clearance_m", params.clearance_m);
   visit("max_acceleration_rad_s2", params.max_acceleration_rad_s2);
   visit("ik_seeds", params.ik_seeds);
@@ -301,6 +304,7 @@ void Sections(Visitor& visit, LibraryParams& params) {
   visit.Nested("planner", params.planner);
   visit.Nested("candidates", params.candidates);
   visit.Nested("mount", params.mount);
+  visit("hand_eye", params.hand_eye);
 }
 
 class YamlReader {
@@ -404,8 +408,14 @@ LibraryParams LoadLibraryParams(const std::filesystem::path& file) {
   LibraryParams params;
   ReadSections(mapping, params);
   mapping.Finish();
-  std::string& urdf = params.mount.arm.urdf;
-  if (!urdf.empty() && std::filesystem::path(urdf).is_relative()) urdf = (file.parent_path() / urdf).string();
+  for (std::string* beside : {&params.mount.arm.urdf, &params.hand_eye}) {
+    if (!beside->empty() && std::filesystem::path(*beside).is_relative()) *beside = (file.parent_path() / *beside).string();
+  }
+  if (!params.hand_eye.empty()) {
+    const auto seat = processes::LoadHandEye(params.hand_eye);
+    params.mount.arm.camera_position_m = seat.T_mount_camera.translation();
+    params.mount.arm.camera_rotation_rad = seat.RotationVector_rad();
+  }
   return params;
 }
 

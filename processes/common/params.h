@@ -32,11 +32,14 @@ struct LibraryParams {
   exploration::PlannerParams planner;
   exploration::CandidateParams candidates;
   motion::MountParams mount;
+  // File of `vantage calibrate --hand-eye` that says where the camera sits on the mount, instead of camera_position_m and
+  // camera_rotation_rad of mount.arm (LoadLibraryParams puts it there) and of the mount process; empty: they count.
+  std::string hand_eye;
 };
 
 // The sections present in the mapping, which may hold others: the caller calls Finish.
 void ReadSections(config::Mapping& mapping, LibraryParams& params);
-// mount.arm.urdf, where it is relative, is relative to the file's folder.
+// mount.arm.urdf and hand_eye, where they are relative, are relative to the file's folder.
 LibraryParams LoadLibraryParams(const std::filesystem::path& file);
 
 // Every value as text by its dotted key, such as "recogniser.ransac.inlier_px": for logs and comparisons.

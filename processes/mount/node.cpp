@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <vantage/operator_command_t.hpp>
 
+#include "common/calibration_file.h"
 #include "common/params.h"
 #include "messaging/channels.h"
 
@@ -19,30 +20,12 @@ std::string Text(const char* format, double a, double b) {
   return text;
 }
 
-}  // namespace
-
-void MountParams::Check() const {
-  const auto require = [](bool ok, const char* what) {
-    if (!ok) throw std::invalid_argument(what);
-  };
-  limits.Check();
-  mount.Check();
-  require(start_eye_m.allFinite() && start_target_m.allFinite() && start_eye_m != start_target_m,
-          "start_eye_m and start_target_m must be different points");
-  require(tolerance >= 0.0, "tolerance must be >= 0");
-  require(max_start_distance_m > 0.0, "max_start_distance_m must be > 0");
-  require(max_start_angle_rad > 0.0, "max_start_angle_rad must be > 0");
-  require(rate_hz >= 1.0 && rate_hz <= 1000.0, "rate_hz must be in [1, 1000]");
-}
-
-MountParams LoadMountParams(const std::string& file, const std::string& library_file) {
-  MountParams params;
-  if (!library_file.empty()) params.mount = params::LoadLibraryParams(library_file).mount;
-  if (file.empty()) return params;
+void ReadFile(const std::string& file, MountParams& params) {
   auto yaml = config::Mapping::Load(file);
   yaml.Get("start_eye_m", params.start_eye_m);
   yaml.Get("start_target_m", params.start_target_m);
   yaml.Get("camera_position_m", params.camera_position_m);
+  yaml.Get("camera_rotation_rad", params.camera_rotation_rad);
   yaml.Get("tolerance", params.tolerance);
   yaml.Get("max_start_distance_m", params.max_start_distance_m);
   yaml.Get("max_start_angle_rad", params.max_start_angle_rad);
@@ -55,6 +38,37 @@ MountParams LoadMountParams(const std::string& file, const std::string& library_
   limits.Finish();
   yaml.Finish();
   yaml.Check(params);
+}
+
+}  // namespace
+
+void MountParams::Check() const {
+  const auto require = [](bool ok, const char* what) {
+    if (!ok) throw std::invalid_argument(what);
+  };
+  limits.Check();
+  mount.Check();
+  require(start_eye_m.allFinite() && start_target_m.allFinite() && start_eye_m != start_target_m,
+          "start_eye_m and start_target_m must be different points");
+  require(camera_position_m.allFinite() && camera_rotation_rad.allFinite(),
+          "camera_position_m and camera_rotation_rad must be finite");
+  require(tolerance >= 0.0, "tolerance must be >= 0");
+  require(max_start_distance_m > 0.0, "max_start_distance_m must be > 0");
+  require(max_start_angle_rad > 0.0, "max_start_angle_rad must be > 0");
+  require(rate_hz >= 1.0 && rate_hz <= 1000.0, "rate_hz must be in [1, 1000]");
+}
+
+MountParams LoadMountParams(const std::string& file, const std::string& library_file) {
+  MountParams params;
+  params::LibraryParams library;
+  if (!library_file.empty()) library = params::LoadLibraryParams(library_file);
+  params.mount = library.mount;
+  if (!file.empty()) ReadFile(file, params);
+  if (!library.hand_eye.empty()) {
+    const auto seat = processes::LoadHandEye(library.hand_eye);
+    params.camera_position_m = seat.T_mount_camera.translation();
+    params.camera_rotation_rad = seat.RotationVector_rad();
+  }
   return params;
 }
 
@@ -87,7 +101,9 @@ std::string WhyRefused(const motion::Trajectory& trajectory, const geometry::Rig
 MountNode::MountNode(messaging::Bus& bus, const MountParams& params)
     : Node(bus, "mount"), params_((params.Check(), params)), mounts_(params.mount) {
   const bool is_arm = params_.mount.type == "arm";
-  state_.T_mount_camera.translation() = is_arm ? params_.mount.arm.camera_position_m : params_.camera_position_m;
+  const auto& arm = params_.mount.arm;
+  state_.T_mount_camera = is_arm ? motion::CameraOnMount(arm.camera_position_m, arm.camera_rotation_rad)
+                                 : motion::CameraOnMount(params_.camera_position_m, params_.camera_rotation_rad);
   geometry::Rigid T_world_camera = geometry::LookAt(params_.start_eye_m, params_.start_target_m, Eigen::Vector3d::UnitZ());
   if (is_arm) {
     const auto stance = mounts_.Make({})->StanceAt(T_world_camera);

@@ -12,21 +12,22 @@
 namespace vantage::mount {
 
 struct MountParams {
-  Eigen::Vector3d start_eye_m{0.55, 0.0, 0.45};      // World; where the camera is at first...
-  Eigen::Vector3d start_target_m{0.0, 0.0, 0.08};    // ...and what it looks at.
-  Eigen::Vector3d camera_position_m{0.0, 0.0, 0.0};  // Of the camera on the mount (T_mount_camera); axes are the mount's.
-  motion::MountParams mount;                         // Of the library: an arm has joints, and its own camera_position_m counts.
-  motion::SpeedLimits limits;                        // A command that breaks them is refused.
-  double tolerance = 0.1;                            // ...by more than this share; >= 0.
-  double max_start_distance_m = 0.02;                // A trajectory starts at most so far from where the mount is; > 0.
-  double max_start_angle_rad = 0.05;                 // Likewise; > 0.
-  double rate_hz = 30.0;                             // Of MOUNT_STATE; in [1, 1000].
+  Eigen::Vector3d start_eye_m{0.55, 0.0, 0.45};        // World; where the camera is at first...
+  Eigen::Vector3d start_target_m{0.0, 0.0, 0.08};      // ...and what it looks at.
+  Eigen::Vector3d camera_position_m{0.0, 0.0, 0.0};    // Of the camera on the mount (T_mount_camera); axes are the mount's.
+  Eigen::Vector3d camera_rotation_rad{0.0, 0.0, 0.0};  // How it is turned there: axis times angle, in the mount's axes.
+  motion::MountParams mount;           // Of the library: an arm has joints, and where its camera sits is said there.
+  motion::SpeedLimits limits;          // A command that breaks them is refused.
+  double tolerance = 0.1;              // ...by more than this share; >= 0.
+  double max_start_distance_m = 0.02;  // A trajectory starts at most so far from where the mount is; > 0.
+  double max_start_angle_rad = 0.05;   // Likewise; > 0.
+  double rate_hz = 30.0;               // Of MOUNT_STATE; in [1, 1000].
 
   void Check() const;  // Throws std::invalid_argument naming the field.
 };
 
-// Reads the fields of the YAML file, and the library's mount from `library_file`; either may be empty. Throws std::runtime_error
-// "FILE:LINE: ...".
+// Reads the fields of the YAML file, and the library's mount from `library_file`; either may be empty. The library's hand_eye file
+// counts before what either says of the camera. Throws std::runtime_error "FILE:LINE: ...".
 MountParams LoadMountParams(const std::string& file, const std::string& library_file = "");
 
 // Why this trajectory of a mount without joints must not be driven from here; empty where it may.

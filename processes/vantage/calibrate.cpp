@@ -80,16 +80,6 @@ void CalibrateLens(const CalibrateOptions& options, const SeenBoards& seen) {
   WriteResult(options.common, json, text.str());
 }
 
-std::string HandEyeYaml(const calibration::HandEyeResult& result) {
-  std::ostringstream text;
-  text << std::setprecision(10)
-       << "# Where the camera sits on the mount: T_mount_camera, row-major, metres; maps camera points into the mount.\n"
-       << "T_mount_camera: [";
-  for (int i = 0; i < 16; ++i) text << (i > 0 ? ", " : "") << result.T_mount_camera(i / 4, i % 4);
-  text << "]\nrms_px: " << result.rms_px << "  # Reprojection error...\nviews: " << result.views << "  # ...over so many views.\n";
-  return text.str();
-}
-
 void CalibrateMount(const CalibrateOptions& options, const SeenBoards& seen) {
   rgbd::CameraCalibration lens{seen.camera, {}};
   if (!options.calibration.empty()) lens = processes::LoadCalibration(options.calibration).calibration;
@@ -98,7 +88,7 @@ void CalibrateMount(const CalibrateOptions& options, const SeenBoards& seen) {
     if (view.T_world_mount) views.push_back({*view.T_world_mount, view.board});
   }
   const auto result = calibration::CalibrateHandEye(views, lens, options.mount);
-  WriteWhole(options.out, HandEyeYaml(result));
+  WriteWhole(options.out, processes::ToYaml(processes::HandEyeFile{result.T_mount_camera, result.rms_px, result.views}));
   Json json{{"images", seen.images},
             {"views", result.views},
             {"T_mount_camera", ToJson(result.T_mount_camera)},

@@ -5,6 +5,9 @@
 #include <fstream>
 #include <sstream>
 
+#include "common/calibration_file.h"
+#include "support/temp_folder.h"
+
 namespace vantage::params {
 namespace {
 
@@ -33,7 +36,9 @@ TEST(Params, TheShippedFileNamesEveryField) {
   text << stream.rdbuf();
   for (const auto& [key, value] : Flatten(LibraryParams())) {
     const std::string field = key.substr(key.rfind('.') + 1);
-    EXPECT_NE(text.str().find(" " + field + ":"), std::string::npos) << key << " (default " << value << ") is not in " << kConfig;
+    const std::string before = key == field ? "\n" : " ";
+    EXPECT_NE(text.str().find(before + field + ":"), std::string::npos)
+        << key << " (default " << value << ") is not in " << kConfig;
   }
 }
 
@@ -61,6 +66,61 @@ TEST(Params, TheShippedArmIsThere) {
   EXPECT_EQ(params.mount.type, "arm");
   EXPECT_TRUE(std::filesystem::exists(params.mount.arm.urdf)) << params.mount.arm.urdf << " is relative to the file";
   EXPECT_NE(ErrorOf("mount:\n  type: arm\n").find("urdf"), std::string::npos);
+}
+
+TEST(Params, TheHandEyeFileIsFoundBesideAndRefusedInOneClearLine) {
+  const testing::TempFolder folder;
+  processes::HandEyeFile written;
+  written.T_mount_camera.linear() = Eigen::AngleAxisd(2.9, Eigen::Vector3d(1, -2, 3).normalized()).toRotationMatrix();
+  written.T_mount_camera.translation() = Eigen::Vector3d(0.02, -0.06, 0.09);
+  written.rms_px = 0.25;
+  written.views = 11;
+  folder.Write("robot/hand.yaml", processes::ToYaml(written));
+  folder.Write("robot/library.yaml", "hand_eye: hand.yaml\nmount: {arm: {camera_position_m: [1, 1, 1]}}\n");
+  const auto params = LoadLibraryParams(folder / "robot/library.yaml");
+  const auto read = processes::LoadHandEye(params.hand_eye);
+  EXPECT_TRUE(read.T_mount_camera.isApprox(written.T_mount_camera, 1e-9));
+  EXPECT_EQ(read.rms_px, 0.25);
+  EXPECT_EQ(read.views, 11);
+  const auto& arm = params.mount.arm;
+  EXPECT_TRUE(motion::CameraOnMount(arm.camera_position_m, arm.camera_rotation_rad).isApprox(written.T_mount_camera, 1e-9));
+
+  const auto complaint = [&](const std::string& text) -> std::string {
+    folder.Write("robot/hand.yaml", text);
+    try {
+      LoadLibraryParams(folder / "robot/library.yaml");
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string head = (folder / "robot/hand.yaml").string() + ":1: T_mount_camera";
+  const std::string unit = "1, 0, 0, 0,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1";
+  EXPECT_EQ(complaint("T_mount_camera: [" + unit + "]\n"), "");
+  for (const auto& [text, words] : std::vector<std::pair<std::string, std::string>>{
+           {"", "found none"},
+           {"views: 3\n", "found none"},
+           {"T_mount_camera: [1, 0, 0]\n", "16 numbers"},
+           {"T_mount_camera: [" + unit + ", 0]\n", "are 17"},
+           {"T_mount_camera: [1, 0, 0, 0,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, .nan, 1]\n", "finite"},
+           {"T_mount_camera: [1, 0, 0, 0,  0, 1, 0, 0,  0, 0, -1, 0,  0, 0, 0, 1]\n", "no rigid transform"},
+           {"T_mount_camera: [2, 0, 0, 0,  0, 2, 0, 0,  0, 0, 2, 0,  0, 0, 0, 1]\n", "no rigid transform"},
+           {"T_mount_camera: [1, 0, 0, 0,  0, 1, 0, 0,  0, 0, 1, 0,  30, 20, 10, 1]\n", "no rigid transform"},
+           {"T_mount_camera: [1, 0, 0, 30,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]\n", "expected metres"},
+       }) {
+    const std::string said = complaint(text);
+    EXPECT_EQ(said.rfind(head, 0), 0u) << said;
+    EXPECT_NE(said.find(words), std::string::npos) << said;
+    EXPECT_EQ(said.find('\n'), std::string::npos) << said;
+  }
+  EXPECT_NE(complaint("T_mount_camera: [" + unit + "]\nfx: 500\n").find("unknown key 'fx'"), std::string::npos);
+  std::filesystem::remove(folder / "robot/hand.yaml");
+  try {
+    LoadLibraryParams(folder / "robot/library.yaml");
+    FAIL() << "a file that is not there";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("hand.yaml"), std::string::npos) << error.what();
+  }
 }
 
 TEST(Params, ErrorsNameFileAndLine) {

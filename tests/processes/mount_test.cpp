@@ -6,8 +6,11 @@
 #include <vantage/operator_command_t.hpp>
 #include <vector>
 
+#include "common/calibration_file.h"
 #include "messaging/channels.h"
+#include "motion/arm_model.h"
 #include "mount/node.h"
+#include "support/temp_folder.h"
 
 namespace vantage::mount {
 namespace {
@@ -97,6 +100,44 @@ TEST(ArmMountTest, DrivesJointsAndRefusesWhatIsNoWayForThem) {
   EXPECT_EQ(node.state().result, MountState::Result::kArrived);
   EXPECT_LT((node.state().T_world_camera().translation() - goal.translation()).norm(), 1e-3);
   EXPECT_EQ(node.state().joints_rad, path.waypoints.back().joints_rad);
+}
+
+// `vantage calibrate --hand-eye` wrote it; both mounts carry their camera so.
+TEST(HandEye, TheCameraIsWhereTheCalibrationSays) {
+  const testing::TempFolder folder;
+  processes::HandEyeFile seat;
+  seat.T_mount_camera.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d(2, -1, 1).normalized()).toRotationMatrix();
+  seat.T_mount_camera.translation() = Eigen::Vector3d(0.03, -0.05, 0.08);
+  folder.Write("hand.yaml", processes::ToYaml(seat));
+  folder.Write("mount.yaml", "camera_position_m: [1.0, 0.0, 0.0]\n");
+  const std::string urdf = std::string(VANTAGE_SOURCE_DIR) + "/config/robots/arm.urdf";
+  folder.Write("free.yaml", "hand_eye: hand.yaml\n");
+  folder.Write("arm.yaml", "hand_eye: hand.yaml\nmount: {type: arm, arm: {urdf: " + urdf + "}}\n");
+  for (const std::string type : {"free", "arm"}) {
+    SCOPED_TRACE(type);
+    std::int64_t now_us = 1000000;
+    messaging::Bus bus("memq://", [&now_us] { return now_us; });
+    std::vector<MountState> states;
+    bus.Subscribe<mount_state_t>(messaging::kMountState,
+                                 [&](const mount_state_t& message) { states.push_back(*messaging::FromMessage(message)); });
+    const MountParams params = LoadMountParams(folder / "mount.yaml", folder / (type + ".yaml"));
+    MountNode node(bus, params);
+    node.RunStep();
+    bus.Drain();
+    ASSERT_FALSE(states.empty());
+    const MountState& state = states.back();
+    EXPECT_TRUE(state.T_mount_camera.isApprox(seat.T_mount_camera, 1e-9)) << state.T_mount_camera.matrix();
+    const auto wanted = geometry::LookAt(params.start_eye_m, params.start_target_m, Eigen::Vector3d::UnitZ());
+    EXPECT_LT((state.T_world_camera().translation() - wanted.translation()).norm(), 2e-4);
+    EXPECT_LT(geometry::AngleBetween(state.T_world_camera().linear().col(2), wanted.linear().col(2)), 1e-3);
+    if (type == "free") continue;
+    // What is told of the mount is where the joints put the last link, the camera left aside.
+    motion::ArmMountParams bare = params.mount.arm;
+    bare.camera_position_m = bare.camera_rotation_rad = Eigen::Vector3d::Zero();
+    const geometry::Rigid T_world_link = motion::LoadArm(bare)->CameraPose(state.joints_rad);
+    EXPECT_LT(geometry::Difference(state.T_world_mount, T_world_link).translation_m, 1e-6);
+    EXPECT_LT(geometry::Difference(state.T_world_mount, T_world_link).rotation_rad, 1e-6);
+  }
 }
 
 TEST_F(MountTest, SaysWhereItIsThirtyTimesASecond) {

@@ -115,8 +115,9 @@ TEST_F(Calibrate, HandEyeFromALog) {
   EXPECT_LT(geometry::Difference(found, T_mount_camera).rotation_rad, 0.003);
   EXPECT_EQ(output.json["views"], 10);
   EXPECT_LT(output.json["position_mm"].get<double>(), 1.5);
-  std::ifstream yaml(File("hand.yaml"));
-  EXPECT_NE(std::string(std::istreambuf_iterator<char>(yaml), {}).find("T_mount_camera: ["), std::string::npos);
+  const auto file = processes::LoadHandEye(File("hand.yaml"));
+  EXPECT_TRUE(file.T_mount_camera.isApprox(found, 1e-6)) << "as the mount reads it";
+  EXPECT_EQ(file.views, 10);
 }
 
 TEST_F(Calibrate, WhatIsWrongIsSaidInOneLine) {
