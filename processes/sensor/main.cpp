@@ -17,6 +17,7 @@ struct Options {
   std::string calibration;
   std::string record;
   bool record_lossless = false;
+  double max_silence_s = vantage::sensor::OpenNiOptions().max_silence_s;
   bool loop = false;
   std::uint32_t seed = 0;
 };
@@ -41,6 +42,7 @@ std::unique_ptr<vantage::sensor::FrameSource> MakeOpenNi(const Options& options)
   if (!options.calibration.empty()) openni.calibration = vantage::processes::LoadCalibration(options.calibration).calibration;
   openni.record = options.record;
   openni.record_lossless = options.record_lossless;
+  openni.max_silence_s = options.max_silence_s;
   return vantage::sensor::MakeOpenNiSource(openni);
 }
 
@@ -73,6 +75,8 @@ int main(int argc, char** argv) {
     app.add_option("--calibration", options.calibration, "intrinsics and distortion, a YAML file of vantage calibrate");
     app.add_option("--record", options.record, "record both streams of the OpenNI2 device in this new .oni file");
     app.add_flag("--record-lossless", options.record_lossless, "...with colour as it is, not as JPEG");
+    app.add_option("--max-silence", options.max_silence_s, "seconds without a frame, then the OpenNI2 device is opened anew")
+        ->check(CLI::Range(0.1, 3600.0));
     app.add_option("--world", options.world, "YAML file of a simulated world; the camera follows MOUNT_STATE");
     app.add_option("--seed", options.seed, "of the simulated noise");
   };

@@ -1,5 +1,6 @@
 #include "sensor/source.h"
 
+#include <algorithm>
 #include <chrono>
 #include <stdexcept>
 
@@ -33,12 +34,12 @@ class RecordingSource : public FrameSource {
 };
 
 constexpr int kTimeout_ms = 500;  // The process stays responsive where a device is silent.
-constexpr int kMaxSilences = 6;   // So many in a row, and it is opened anew.
 constexpr std::chrono::seconds kLookEvery{1};
 
 class OpenNiFrames : public FrameSource {
  public:
-  explicit OpenNiFrames(const OpenNiOptions& options) : record_(options.record) {
+  explicit OpenNiFrames(const OpenNiOptions& options) : record_(options.record), max_silence_s_(options.max_silence_s) {
+    if (!(max_silence_s_ >= 0.1)) throw std::invalid_argument("max_silence_s must be >= 0.1");
     params_.uri = options.uri;
     params_.repeat = options.loop;
     params_.width = options.width;
@@ -47,7 +48,7 @@ class OpenNiFrames : public FrameSource {
     params_.calibration = options.calibration;
     params_.record = options.record;
     params_.record_lossless = options.record_lossless;
-    params_.timeout_ms = kTimeout_ms;
+    params_.timeout_ms = static_cast<int>(std::min<double>(kTimeout_ms, 1e3 * max_silence_s_));
     Open();
   }
 
@@ -69,7 +70,7 @@ class OpenNiFrames : public FrameSource {
   void Open() {
     source_ = std::make_unique<rgbd::OpenNiSource>(params_);
     name_ = source_->uri() + ": " + source_->modes();
-    silences_ = 0;
+    heard_ = std::chrono::steady_clock::now();
     if (source_->is_recording()) return;
     params_.uri = source_->uri();  // The same device again, wherever it is plugged in.
     params_.elsewhere = true;
@@ -93,13 +94,14 @@ class OpenNiFrames : public FrameSource {
   std::optional<rgbd::Frame> Read() {
     try {
       auto frame = source_->Next();
-      silences_ = 0;
+      heard_ = std::chrono::steady_clock::now();
       return frame;
     } catch (const rgbd::DeviceGone&) {
       Close();
       throw;
     } catch (const std::runtime_error&) {
-      if (!source_->is_recording() && ++silences_ >= kMaxSilences) Close();
+      const std::chrono::duration<double> silence = std::chrono::steady_clock::now() - heard_;
+      if (!source_->is_recording() && silence.count() >= max_silence_s_) Close();
       throw;
     }
   }
@@ -111,11 +113,11 @@ class OpenNiFrames : public FrameSource {
 
   rgbd::OpenNiParams params_;
   std::string record_;
+  double max_silence_s_;
   std::unique_ptr<rgbd::OpenNiSource> source_;  // None while the device is not there.
   std::string name_;
-  std::chrono::steady_clock::time_point next_look_;
+  std::chrono::steady_clock::time_point next_look_, heard_;
   int opened_ = 1;
-  int silences_ = 0;
   std::int64_t next_id_ = 0;
   bool ended_ = false;
 };

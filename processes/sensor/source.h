@@ -36,10 +36,12 @@ struct OpenNiOptions {
   std::optional<rgbd::CameraCalibration> calibration;
   std::string record;  // .oni file; empty: none. After a replug the next is NAME-2.oni.
   bool record_lossless = false;
+  double max_silence_s = 3.0;  // A device silent for so long is closed and opened anew; >= 0.1.
 };
 
-// An OpenNI2 device or .oni recording. A device that is unplugged, or silent for 3 s, is looked for once a second, also at other
-// ports, and goes on; meanwhile Waiting(). Throws std::runtime_error as OpenNiSource does: at first its device must be there.
+// An OpenNI2 device or .oni recording. A device that is unplugged, or silent for max_silence_s, is looked for once a second, also
+// at other ports, and goes on; meanwhile Waiting(). Throws std::runtime_error as OpenNiSource does: at first its device must be
+// there; std::invalid_argument for max_silence_s.
 std::unique_ptr<FrameSource> MakeOpenNiSource(const OpenNiOptions& options);
 
 // What the camera on the mount sees in a world; from the start pose until the mount says where it is.

@@ -3,6 +3,8 @@
 #include <signal.h>
 
 #include <chrono>
+#include <filesystem>
+#include <functional>
 #include <thread>
 #include <vantage/status_t.hpp>
 
@@ -255,47 +257,128 @@ TEST_F(OpenNiDevice, RecordsWhatPlaysBack) {
   }
 }
 
-// The whole sensor: what it says and does while its camera is pulled out and put back elsewhere.
-TEST_F(OpenNiDevice, TheSensorSurvivesUnplugAndReplug) {
-  InChild([] {
-    messaging::Bus bus("memq://");
-    messaging::FrameReceiver receiver(bus);
-    std::vector<status_t> told;
-    bus.Subscribe<status_t>(messaging::StatusChannel("sensor"), [&](const status_t& status) { told.push_back(status); });
+// The whole sensor, with what it says and sends.
+class RunningSensor {
+ public:
+  explicit RunningSensor(const sensor::OpenNiOptions& options)
+      : receiver(bus_), node_(bus_, sensor::MakeOpenNiSource(options), Fast()) {
+    bus_.Subscribe<status_t>(messaging::StatusChannel("sensor"), [this](const status_t& status) { told.push_back(status); });
+  }
+
+  // Ends sooner where `until` becomes true; whether it did.
+  bool RunFor(
+      double seconds, const std::function<bool()>& until = [] { return false; }) {
+    const auto end = std::chrono::steady_clock::now() + Seconds(seconds);
+    bool reached = false;
+    messaging::RunParams run;
+    run.status_period_s = 0.1;
+    run.until = [&] { return (reached = until()) || std::chrono::steady_clock::now() > end; };
+    EXPECT_EQ(messaging::RunNodes(bus_, {&node_}, nullptr, run), messaging::RunEnd::kCondition);
+    return reached;
+  }
+  bool Said(const std::string& words) const {
+    return std::any_of(told.begin(), told.end(),
+                       [&](const status_t& status) { return status.last_error.find(words) != std::string::npos; });
+  }
+
+ private:
+  static sensor::SensorNodeParams Fast() {
     sensor::SensorNodeParams params;
     params.rate_hz = 30.0;
+    return params;
+  }
+  messaging::Bus bus_{"memq://"};
+
+ public:
+  messaging::FrameReceiver receiver;
+  std::vector<status_t> told;
+
+ private:
+  sensor::SensorNode node_;
+};
+
+// While its camera is pulled out and put back elsewhere.
+TEST_F(OpenNiDevice, TheSensorSurvivesUnplugAndReplug) {
+  InChild([] {
     sensor::OpenNiOptions options;
     options.uri = "test/camera@1";
-    sensor::SensorNode node(bus, sensor::MakeOpenNiSource(options), params);
-    const auto run_for = [&](double seconds) {
-      const auto end = std::chrono::steady_clock::now() + Seconds(seconds);
-      messaging::RunParams run;
-      run.status_period_s = 0.1;
-      run.until = [&] { return std::chrono::steady_clock::now() > end; };
-      EXPECT_EQ(messaging::RunNodes(bus, {&node}, nullptr, run), messaging::RunEnd::kCondition);
-    };
-    run_for(1.0);
-    EXPECT_GT(receiver.frames(), 20);
-    EXPECT_EQ(told.back().state, "streaming");
-    ExpectWords(told.back().detail, {"test/camera@1", "640x480 RGB888"});
+    RunningSensor sensor(options);
+    sensor.RunFor(1.0);
+    EXPECT_GT(sensor.receiver.frames(), 20);
+    EXPECT_EQ(sensor.told.back().state, "streaming");
+    ExpectWords(sensor.told.back().detail, {"test/camera@1", "640x480 RGB888"});
     Camera().Command("plugged 0\n");
-    run_for(2.5);
-    const auto before = receiver.frames();
-    EXPECT_EQ(told.back().state, "waiting");
-    EXPECT_TRUE(std::any_of(told.begin(), told.end(),
-                            [](const auto& status) { return status.last_error.find("unplugged") != std::string::npos; }));
-    ExpectWords(told.back().last_error, {"found none"});
-    run_for(0.5);
-    EXPECT_EQ(receiver.frames(), before);
+    sensor.RunFor(2.5);
+    const auto before = sensor.receiver.frames();
+    EXPECT_EQ(sensor.told.back().state, "waiting");
+    EXPECT_TRUE(sensor.Said("unplugged"));
+    ExpectWords(sensor.told.back().last_error, {"found none"});
+    sensor.RunFor(0.5);
+    EXPECT_EQ(sensor.receiver.frames(), before);
     Camera().Command("address 7\n");
-    run_for(2.5);
-    EXPECT_GT(receiver.frames(), before + 20);
-    EXPECT_EQ(told.back().state, "streaming");
-    ExpectWords(told.back().detail, {"test/camera@7"});
-    const auto received = receiver.Take();
+    sensor.RunFor(2.5);
+    EXPECT_GT(sensor.receiver.frames(), before + 20);
+    EXPECT_EQ(sensor.told.back().state, "streaming");
+    ExpectWords(sensor.told.back().detail, {"test/camera@7"});
+    const auto received = sensor.receiver.Take();
     ASSERT_TRUE(received);
     EXPECT_GT(received->frame.id, before - 1) << "frame numbers go on";
   });
+}
+
+// A camera whose firmware hangs sends nothing more, though it is plugged in: only opening it anew helps.
+TEST_F(OpenNiDevice, TheSensorReopensACameraThatHangs) {
+  EXPECT_EQ(sensor::OpenNiOptions().max_silence_s, 3.0) << "as the README says";
+  InChild([] {
+    sensor::OpenNiOptions options;
+    options.max_silence_s = 1.0;
+    options.record = (Camera().folder() / "hangs.oni").string();
+    RunningSensor sensor(options);
+    auto& receiver = sensor.receiver;
+    EXPECT_TRUE(sensor.RunFor(10.0, [&] { return receiver.frames() > 10; }));
+    Camera().Command("hung 1\n");
+    sensor.RunFor(0.2);
+    const auto before = receiver.frames();
+    const auto since = std::chrono::steady_clock::now();
+    EXPECT_TRUE(sensor.RunFor(10.0, [&] { return receiver.frames() > before + 10; })) << sensor.told.back().last_error;
+    EXPECT_GT(Seconds(std::chrono::steady_clock::now() - since).count(), 1.0) << "as long as it may be silent, and a look";
+    EXPECT_TRUE(sensor.Said("silent")) << sensor.told.back().last_error;
+    EXPECT_TRUE(std::any_of(sensor.told.begin(), sensor.told.end(), [](const auto& status) { return status.state == "waiting"; }));
+    sensor.RunFor(0.2);
+    EXPECT_EQ(sensor.told.back().state, "streaming");
+    const auto received = receiver.Take();
+    ASSERT_TRUE(received);
+    EXPECT_GE(received->frame.id, before + 10) << "frame numbers go on";
+    EXPECT_TRUE(std::filesystem::exists(Camera().folder() / "hangs-2.oni")) << "the recording goes on in a new file";
+  });
+}
+
+// Silent however often it is opened: it is tried again and again, and taken up when it comes back.
+TEST_F(OpenNiDevice, TheSensorNeverGivesUpOnASilentCamera) {
+  for (const bool recorded : {false, true}) {
+    SCOPED_TRACE(recorded ? "recorded" : "not recorded");
+    Camera().Command("");
+    InChild([recorded] {
+      sensor::OpenNiOptions options;
+      options.max_silence_s = 0.3;
+      if (recorded) options.record = (Camera().folder() / "silent.oni").string();
+      RunningSensor sensor(options);
+      auto& receiver = sensor.receiver;
+      EXPECT_TRUE(sensor.RunFor(10.0, [&] { return receiver.frames() > 5; }));
+      Camera().Command("stalled 1\n");
+      sensor.RunFor(0.2);
+      const auto before = receiver.frames();
+      const auto told = sensor.told.size();
+      sensor.RunFor(5.0);  // Opened anew three times or so.
+      EXPECT_EQ(receiver.frames(), before);
+      EXPECT_GT(sensor.told.size(), told + 5) << "it goes on to say how it fares";
+      EXPECT_NE(sensor.told.back().last_error.find("silent"), std::string::npos) << sensor.told.back().last_error;
+      EXPECT_FALSE(std::filesystem::exists(Camera().folder() / "silent-2.oni")) << "no recording of nothing is left";
+      Camera().Command("");
+      EXPECT_TRUE(sensor.RunFor(10.0, [&] { return receiver.frames() > before + 10; })) << sensor.told.back().last_error;
+      EXPECT_EQ(std::filesystem::exists(Camera().folder() / "silent-2.oni"), recorded);
+    });
+  }
 }
 
 TEST_F(OpenNiDevice, TheSensorProgramRecordsUntilItIsEnded) {
@@ -309,7 +392,13 @@ TEST_F(OpenNiDevice, TheSensorProgramRecordsUntilItIsEnded) {
             nullptr);
     _exit(127);
   }
-  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  // A busy machine takes seconds to start it: what counts is that frames come to the disk, not how soon.
+  const auto patience = std::chrono::steady_clock::now() + Seconds(30.0);
+  std::error_code none;
+  const auto bytes = [&] { return std::filesystem::exists(file, none) ? std::filesystem::file_size(file, none) : 0; };
+  while (bytes() < 1000000 && std::chrono::steady_clock::now() < patience) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
   ::kill(sensor, SIGTERM);
   int status = 0;
   ASSERT_EQ(waitpid(sensor, &status, 0), sensor);
@@ -320,7 +409,7 @@ TEST_F(OpenNiDevice, TheSensorProgramRecordsUntilItIsEnded) {
     OpenNiSource source(play);
     int played = 0;
     while (const auto frame = source.Next()) played += frame->color.size() == cv::Size(320, 240);
-    EXPECT_GT(played, 15);
+    EXPECT_GT(played, 5);
   });
 }
 

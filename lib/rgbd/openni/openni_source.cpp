@@ -118,7 +118,7 @@ class OpenNiSource::Implementation {
     if (!params_.record.empty()) PrepareRecording();
     for (Stream* stream : {&color_, &depth_})
       if (stream->video.start() != openni::STATUS_OK) Fail(uri_, "expected the streams to start, found: " + Complaint());
-    if (recorder_.isValid() && !is_recording()) StartRecording();
+    if (recorder_.isValid() && !is_recording()) StartRecordingOrLeaveNone();
   }
 
   ~Implementation() {
@@ -263,6 +263,18 @@ class OpenNiSource::Implementation {
         recorder_.attach(color_.video, !params_.record_lossless) != openni::STATUS_OK ||
         recorder_.attach(depth_.video, false) != openni::STATUS_OK || (is_recording() && recorder_.start() != openni::STATUS_OK))
       Fail(file, "expected to record there, found: " + Complaint() + "; does its folder exist, and may it be written?");
+  }
+
+  // A camera that is silent leaves no file behind that would be in the way when it is opened anew.
+  void StartRecordingOrLeaveNone() {
+    try {
+      StartRecording();
+    } catch (const std::runtime_error&) {
+      recorder_.destroy();
+      std::error_code ignored;
+      std::filesystem::remove(params_.record, ignored);
+      throw;
+    }
   }
 
   // OpenNI's recorder calls the first frame of either stream time 0. So it starts just after a pair came, when the next is far.

@@ -43,6 +43,7 @@ struct Control {
   int address = 1;     // Where it is plugged in: part of the URI "test/camera@ADDRESS".
   int openable = 1;    // 0: no permission.
   int stalled = 0;     // 1: no frames come.
+  int hung = 0;        // 1: the camera that is open now sends nothing more, for ever; opened anew it does.
   int drop_color = 0;  // Every n-th colour image is left out; 0: none.
   int drop_depth = 0;
   int registration = 1;   // Whether the device can register depth to colour...
@@ -61,6 +62,7 @@ Control ReadControl() {
                                               {"address", &control.address},
                                               {"openable", &control.openable},
                                               {"stalled", &control.stalled},
+                                              {"hung", &control.hung},
                                               {"drop_color", &control.drop_color},
                                               {"drop_depth", &control.drop_depth},
                                               {"registration", &control.registration},
@@ -242,11 +244,13 @@ class Camera : public DeviceBase {
  private:
   void Run() {
     const auto begin = std::chrono::steady_clock::now();
+    bool hung = false;
     for (int number = 1; !ended_; ++number) {
       const auto due = std::chrono::microseconds(static_cast<std::int64_t>(number) * 1000000 / kFps);
       std::this_thread::sleep_until(begin + due);
       const Control control = ReadControl();
-      if (unplugged_ || control.stalled || color_.empty() || depth_.empty()) continue;
+      hung = hung || (control.hung && !start_.hung);
+      if (unplugged_ || hung || control.stalled || color_.empty() || depth_.empty()) continue;
       const std::uint64_t time_us = kClockStart_us + static_cast<std::uint64_t>(due.count());
       const auto dropped = [number](int every) { return every > 0 && number % every == 0; };
       const std::lock_guard<std::mutex> lock(mutex_);
