@@ -14,6 +14,7 @@
 #include "messaging/geometry_messages.h"
 #include "messaging/run_loop.h"
 #include "planner/node.h"
+#include "processes/blank_frame.h"
 #include "recogniser/node.h"
 #include "sensor/node.h"
 #include "support/folder.h"
@@ -40,19 +41,6 @@ void PublishRubbish(messaging::Bus& bus) {
   }
 }
 
-rgbd::Frame BlankFrame(std::int64_t utime) {
-  rgbd::Frame frame;
-  frame.utime = utime;
-  frame.color = cv::Mat(120, 160, CV_8UC3, cv::Scalar(90, 90, 90));
-  frame.depth = cv::Mat::zeros(120, 160, CV_16UC1);
-  frame.camera.width = 160;
-  frame.camera.height = 120;
-  frame.camera.fx = frame.camera.fy = 130.0;
-  frame.camera.cx = 79.5;
-  frame.camera.cy = 59.5;
-  return frame;
-}
-
 TEST(BadInput, LearnerCountsRubbishAndGoesOn) {
   const testing::TemporaryFolder folder;
   messaging::Bus bus("memq://");
@@ -65,7 +53,7 @@ TEST(BadInput, LearnerCountsRubbishAndGoesOn) {
   Settle(bus, node);
   EXPECT_EQ(node.bad(), 10);  // Two on each of the five channels it listens to.
   EXPECT_NE(node.last_error(), "");
-  messaging::FrameSender(bus).Send(BlankFrame(bus.now_us()));
+  messaging::FrameSender(bus).Send(testing::BlankFrame(bus.now_us(), 160, 120));
   Settle(bus, node);
   bus.Drain();
   ASSERT_EQ(tracks.size(), 1u);
@@ -99,7 +87,7 @@ TEST(BadInput, RecogniserWithoutAStoreFindsNothingAndRefusesPriorsThatAreNone) {
   bus.Publish(messaging::kObjectPrior, prior);
   Settle(bus, node);
   EXPECT_EQ(node.bad(), 1 + 8);  // The prior, and two on each of the four channels it listens to.
-  messaging::FrameSender(bus).Send(BlankFrame(bus.now_us()));
+  messaging::FrameSender(bus).Send(testing::BlankFrame(bus.now_us(), 160, 120));
   Settle(bus, node);
   bus.Drain();
   ASSERT_EQ(heard.size(), 1u);
