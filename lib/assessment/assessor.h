@@ -21,7 +21,7 @@ struct TrialParams {
   double max_scale_octaves = 1.0;  // Distances +-max about the views' median, mostly near it: 1 = 0.5..2 times; >= 0.
   double max_image_noise = 16.0;   // Sigma, grey levels: 8 even levels from 0; >= 0.
   double max_blur_px = 1.6;        // Sigma, likewise; >= 0.
-  double level_ratio = 0.5;        // Every level is so much rarer than the one below; (0, 1], 1 = all alike.
+  double level_ratio = 0.25;       // Every level is so much rarer than the one below; (0, 1], 1 = all alike.
   double max_brightness = 0.25;    // Relative change of brightness, and of gamma; [0, 1).
   double max_occlusion = 0.0;      // Something hides up to this share of the object's box; [0, 1).
   double correct_m = 0.04;         // Mean point distance below which a detection is right; > 0.

@@ -66,7 +66,11 @@ double StrengthLimit::Measure(double blur_px, double image_noise) const {
   return *weakest;
 }
 
-features::Features Strongest(const features::Features& features, double min_response) {
+features::Features ExtractStrong(const cv::Mat& gray, const features::FeatureParams& params, double min_response) {
+  constexpr double kSiftLayers = 3.0;  // OpenCV's threshold is on the response times the layers of an octave.
+  features::FeatureParams strict = params;
+  if (params.type == "sift") strict.contrast_threshold = std::max(params.contrast_threshold, kSiftLayers * min_response);
+  const features::Features features = features::Extract(gray, cv::Mat(), strict);
   std::vector<int> strong;
   for (int i = 0; i < features.size(); ++i) {
     if (features.keypoints[static_cast<std::size_t>(i)].response >= min_response) strong.push_back(i);

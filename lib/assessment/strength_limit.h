@@ -30,7 +30,8 @@ class StrengthLimit {
   std::map<std::pair<double, double>, double> responses_;  // By blur and noise, at the image's own brightness.
 };
 
-// Those of at least this response, in their order.
-features::Features Strongest(const features::Features& features, double min_response);
+// The image's points of at least this response: those that features::Extract finds less the weaker ones, which are not described
+// first (a third of the time).
+features::Features ExtractStrong(const cv::Mat& gray, const features::FeatureParams& params, double min_response);
 
 }  // namespace vantage::assessment

@@ -131,7 +131,7 @@ class TrialRunner {
       Hide(dice.Uniform(0.0, params_.max_occlusion), cv::boundingRect(shown.mask), window, &dice, &frame.color);
     }
     Disturb(disturbance, dice.Bits(), &frame.color);
-    const features::Features features = Strongest(alone_->Extract(frame), MinResponse(disturbance));
+    const features::Features features = ExtractStrong(rgbd::Gray(frame), recogniser_params_.features, MinResponse(disturbance));
     trial.alone = Propose(*alone_, frame, features, T_camera_object);
     trial.together = view_ == 0 ? trial.alone : Propose(*together_, frame, features, T_camera_object);
     trial.others = Others(T_camera_object);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 namespace vantage::assessment {
@@ -21,10 +22,27 @@ cv::Mat Blobs(const cv::Size& size) {
   return image;
 }
 
-features::Features Found(const cv::Mat& image, const features::FeatureParams& params) {
+cv::Mat Gray(const cv::Mat& image) {
   cv::Mat gray;
   cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
-  return features::Extract(gray, {}, params);
+  return gray;
+}
+
+features::Features Found(const cv::Mat& image, const features::FeatureParams& params) {
+  return features::Extract(Gray(image), {}, params);
+}
+
+// Place, direction and descriptor of every point; the detector's order depends on how many there are.
+std::vector<std::vector<float>> InOrder(const features::Features& features) {
+  std::vector<std::vector<float>> points;
+  for (int i = 0; i < features.size(); ++i) {
+    const cv::KeyPoint& keypoint = features.keypoints[static_cast<std::size_t>(i)];
+    points.push_back({keypoint.pt.x, keypoint.pt.y, keypoint.angle});
+    const cv::Mat descriptor = features.descriptors.row(i);
+    points.back().insert(points.back().end(), descriptor.begin<float>(), descriptor.end<float>());
+  }
+  std::sort(points.begin(), points.end());
+  return points;
 }
 
 class StrengthLimitTest : public ::testing::Test {
@@ -61,8 +79,8 @@ TEST_F(StrengthLimitTest, BlurLowersItAndNoiseCompetes) {
   const features::Features whole = Found(disturbed, params_);
   const auto in_window = std::count_if(whole.keypoints.begin(), whole.keypoints.end(),
                                        [](const cv::KeyPoint& keypoint) { return keypoint.pt.x < 320.f && keypoint.pt.y < 240.f; });
-  const features::Features window = Found(disturbed(cv::Rect(0, 0, 320, 240)), params_);
-  EXPECT_NEAR(Strongest(window, limit.Response(noisy)).size(), in_window, 0.15 * static_cast<double>(in_window));
+  const cv::Mat window = Gray(disturbed(cv::Rect(0, 0, 320, 240)));
+  EXPECT_NEAR(ExtractStrong(window, params_, limit.Response(noisy)).size(), in_window, 0.15 * static_cast<double>(in_window));
 }
 
 TEST_F(StrengthLimitTest, IsNoneWhereTheImageKeepsAll) {
@@ -72,17 +90,21 @@ TEST_F(StrengthLimitTest, IsNoneWhereTheImageKeepsAll) {
   EXPECT_EQ(StrengthLimit(image_, {}, params_, {320, 240}).Response({}), 0.0);
 }
 
-TEST(Strongest, KeepsOrderAndDescriptors) {
-  features::Features features;
-  features.descriptors = cv::Mat(3, 2, CV_32F);
-  for (int i = 0; i < 3; ++i) {
-    features.keypoints.emplace_back(static_cast<float>(i), 0.f, 4.f, 0.f, i == 1 ? 0.1f : 0.5f);
-    features.descriptors.at<float>(i, 0) = features.descriptors.at<float>(i, 1) = static_cast<float>(i);
+// What is not described first makes no difference to what is left.
+TEST_F(StrengthLimitTest, StrongPointsAreThoseOfAllThatAreStrong) {
+  for (const char* type : {"sift", "surf"}) {
+    params_.type = type;
+    const features::Features all = Found(image_, params_);
+    std::vector<float> responses;
+    for (const cv::KeyPoint& keypoint : all.keypoints) responses.push_back(keypoint.response);
+    std::nth_element(responses.begin(), responses.begin() + all.size() / 2, responses.end());
+    const float middle = responses[static_cast<std::size_t>(all.size() / 2)];
+    std::vector<int> strong;
+    for (int i = 0; i < all.size(); ++i) {
+      if (all.keypoints[static_cast<std::size_t>(i)].response >= middle) strong.push_back(i);
+    }
+    EXPECT_EQ(InOrder(ExtractStrong(Gray(image_), params_, middle)), InOrder(features::Select(all, strong))) << type;
   }
-  const features::Features strong = Strongest(features, 0.3);
-  ASSERT_EQ(strong.size(), 2);
-  EXPECT_EQ(strong.keypoints[1].pt.x, 2.f);
-  EXPECT_EQ(strong.descriptors.at<float>(1, 0), 2.f);
 }
 
 }  // namespace
