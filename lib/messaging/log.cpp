@@ -30,11 +30,14 @@ void AppendBigEndian(Number number, std::string& bytes) {
 
 }  // namespace
 
-LogReader::LogReader(const std::filesystem::path& file) : file_(file), stream_(file, std::ios::binary) {
+LogReader::LogReader(const std::filesystem::path& file) : file_(file) {
   std::error_code failed;
   if (!std::filesystem::exists(file, failed)) throw std::runtime_error(file.string() + ": no such log");
+  const bool is_file = std::filesystem::is_regular_file(file, failed);
+  if (is_file) stream_.open(file, std::ios::binary);  // A pipe would wait for ever.
   bytes_ = static_cast<std::int64_t>(std::filesystem::file_size(file, failed));
-  if (failed || !stream_) throw std::runtime_error(file.string() + ": cannot be read; is it a file, are you allowed to?");
+  if (failed || !is_file || !stream_)
+    throw std::runtime_error(file.string() + ": cannot be read; is it a file, are you allowed to?");
   if (bytes_ > 0 && FindHead(0, bytes_) == bytes_) {
     throw std::runtime_error(file.string() + ": is no LCM log (there is no event in it); lcm-logger and scripts/record make one");
   }

@@ -94,6 +94,11 @@ std::vector<std::string> LogSummary::UnknownChannels() const {
 
 std::vector<std::string> LogSummary::Problems() const {
   std::vector<std::string> problems;
+  if (events == 0) {
+    problems.push_back("there is nothing in this log");
+  } else if (UnknownChannels().size() == channels.size()) {
+    problems.push_back("none of its " + Times(events, "message", "messages") + " is on a channel of ours");
+  }
   if (damage.places > 0) {
     problems.push_back(Times(damage.places, "damaged place", "damaged places") + ", " + std::to_string(damage.skipped_bytes) +
                        " bytes passed over, the first at byte " + std::to_string(damage.first_offset) +

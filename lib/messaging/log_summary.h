@@ -42,7 +42,8 @@ struct LogSummary {
   // lcm-logger dates a message by its fragments but writes it when it is whole: 43 ms out of order in 5 minutes on a busy machine.
   // So little is no fault.
   static constexpr std::int64_t kLoggerDisorder_us = 500000;
-  // One line for everything that is wrong; empty where nothing is. Channels that are not ours are named, and are no fault.
+  // One line for everything that is wrong; empty where nothing is. Channels that are not ours are named, and are no
+  // fault unless there are no others.
   std::vector<std::string> Problems() const;
   std::vector<std::string> UnknownChannels() const;
 };

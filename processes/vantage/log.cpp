@@ -107,6 +107,19 @@ void RunVerify(const LogOptions& options) {
                            (problems.size() == 1 ? " problem" : " problems") + ", the first: " + problems.front());
 }
 
+messaging::LogReader OpenLog(const std::string& file) {
+  messaging::LogReader log(file);
+  if (log.bytes() == 0) throw std::runtime_error(file + ": there is nothing in this log");
+  return log;
+}
+
+// For people; empty where nothing is damaged.
+std::string PassedOver(const messaging::LogDamage& damage) {
+  if (damage.places == 0) return "";
+  return std::to_string(damage.places) + (damage.places == 1 ? " damaged place was" : " damaged places were") + " passed over" +
+         (damage.cut_off ? "; the log is cut off at its end\n" : "\n");
+}
+
 std::regex Regex(const std::string& option, const std::string& text) {
   try {
     return std::regex(text, std::regex::extended);
@@ -121,7 +134,7 @@ void RunCopy(const LogOptions& options) {
   if (!(options.from_s <= options.to_s)) throw std::runtime_error("--from must not be after --to");
   const std::regex channels = Regex("--channels", options.channels);
   const std::regex without = Regex("--without", options.without.empty() ? "x" : options.without);
-  messaging::LogReader log(options.log);
+  messaging::LogReader log = OpenLog(options.log);
   CheckWritable(options.out);
   messaging::LogWriter out(options.out);
   std::int64_t events = 0;
@@ -139,8 +152,7 @@ void RunCopy(const LogOptions& options) {
   result["events_out"] = out.events();
   result["damaged_places"] = log.damage().places;
   std::ostringstream text;
-  text << out.events() << " of " << events << " events\n";
-  if (log.damage().places > 0) text << log.damage().places << " damaged places were passed over\n";
+  text << out.events() << " of " << events << " events\n" << PassedOver(log.damage());
   WriteResult(options.common, result, text.str());
 }
 
@@ -173,19 +185,21 @@ class SceneExport {
 void RunExport(const LogOptions& options) {
   CheckOutput(options.common);
   if (options.bop.empty() && options.csv.empty()) throw std::runtime_error("say what to write: --bop DIR, --csv DIR or both");
-  messaging::LogReader log(options.log);
+  messaging::LogReader log = OpenLog(options.log);
   std::unique_ptr<SceneExport> scene;
   std::unique_ptr<LogTables> tables;
   if (!options.bop.empty()) scene = std::make_unique<SceneExport>(options.bop);
   if (!options.csv.empty()) tables = std::make_unique<LogTables>(options.csv);
-  std::int64_t left_out = 0;
+  std::int64_t messages = 0, left_out = 0;
   while (const auto event = log.Next()) {
+    ++messages;
     if (scene) scene->Add(*event);
     if (tables && !tables->Add(*event)) ++left_out;
   }
   Json result;
   std::ostringstream text;
   if (scene) {
+    if (scene->frames() == 0) throw std::runtime_error(options.log + ": no whole frame in it, so there is no scene to write");
     scene->Finish();
     result["frames"] = scene->frames();
     result["lost_frames"] = scene->lost();
@@ -193,11 +207,17 @@ void RunExport(const LogOptions& options) {
   }
   if (tables) {
     tables->Finish();
+    if (left_out == messages) {
+      throw std::runtime_error(options.log + ": nothing in it for tables; all its " + std::to_string(messages) +
+                               " messages are of other types or would be refused");
+    }
     result["rows"] = tables->rows();
     result["left_out"] = left_out;
     for (const auto& [channel, rows] : tables->rows()) text << channel << ".csv: " << rows << " rows\n";
     if (left_out > 0) text << left_out << " messages are of other types or would be refused: left out\n";
   }
+  result["damaged_places"] = log.damage().places;
+  text << PassedOver(log.damage());
   WriteResult(options.common, result, text.str());
 }
 

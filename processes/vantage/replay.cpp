@@ -194,6 +194,10 @@ class Replay {
       Play(*event);
       steps.Settle();
     }
+    if (tally_.left_out == tally_.events_in) {
+      throw std::runtime_error(log_.file().string() + ": nothing in it to replay; all its " + std::to_string(tally_.events_in) +
+                               " messages are of other types or were said by these processes themselves");
+    }
     steps.PublishStatus();
     out_.Close();
     tally_.damaged_places = log_.damage().places;
@@ -269,7 +273,10 @@ void AddReplay(CLI::App& app, Run& run) {
   AddCommonOptions(*verb, options->common);
   verb->add_option("--log,log", options->log, "The LCM log")->required()->type_name("FILE");
   verb->add_option("--out", options->out, "Log of what the nodes say; must not exist yet")->required()->type_name("FILE");
-  verb->add_option("--processes", options->processes, "Which nodes run; what they said themselves is left out of the log")
+  verb->add_option(
+          "--processes", options->processes,
+          "Which nodes run; what they said themselves is left out of the log. The mount and the sensor are the log's: they do "
+          "not follow a replayed planner, whose commands are only noted")
       ->delimiter(',')
       ->capture_default_str();
   verb->add_option("--process-configs", options->configs,

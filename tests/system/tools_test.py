@@ -1,5 +1,6 @@
-"""Tests of scripts/doctor and scripts/spy. usage: tools_test.py TEST FOLDER_OF_PROGRAMS; runs in a network of its own (in_network)."""
+"""Tests of scripts/doctor, spy, record and replay, and of `vantage log` and `replay` on logs that are none. usage: tools_test.py TEST FOLDER_OF_PROGRAMS; runs in a network of its own (in_network)."""
 import os
+import random
 import re
 import struct
 import subprocess
@@ -153,6 +154,93 @@ def test_view(folder):
         for process in reversed(running):
             process.terminate()
             process.wait(20)
+
+
+def event(number, channel, data):
+    return struct.pack(">IqqII", 0xEDA1DA01, number, 1700000000000000 + 100000 * number, len(channel), len(data)) + channel + data
+
+
+# A user who is nobody special, also where the test is run by root.
+NOBODY_SPECIAL = ["setpriv", "--bounding-set", "-dac_override,-dac_read_search"]
+VERBS = {"info": ["log", "info"], "verify": ["log", "verify"], "cut": ["log", "cut", "--out", "OUT"],
+         "filter": ["log", "filter", "--out", "OUT"], "csv": ["log", "export", "--csv", "OUT"], "bop": ["log", "export", "--bop", "OUT"],
+         "replay": ["replay", "--processes", "recogniser", "--out", "OUT"]}
+
+
+def tell(words, out):
+    """(exit code, standard output, standard error) of a command that must end by itself; what it wrote is removed."""
+    done = subprocess.run([*NOBODY_SPECIAL, *[str(out) if word == "OUT" else word for word in words]], text=True, check=False, timeout=60,
+                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    subprocess.run(["rm", "-rf", out], check=True)
+    return done.returncode, done.stdout, done.stderr
+
+
+def check_one_line(words, out, *wanted):
+    """It ends with 1 and one line that says all that is wanted."""
+    code, _, said = tell(words, out)
+    check(code == 1 and said.count("\n") == 1 and all(word in said for word in wanted), f"{words}: {code}, {said}, not {wanted}")
+
+
+def test_logs(folder):
+    """Logs that are cut off, empty or none, and disks that are full: one clear line each, and no crash."""
+    vantage, out = BIN / "vantage", folder / "out"
+    record, play = ROOT / "scripts" / "record", ROOT / "scripts" / "replay"
+    good = folder / "good.lcm"
+    subprocess.run([BIN / "make_log", good, "6", "2", "9"], check=True)
+    logs = {name: folder / f"{name}.lcm" for name in ("cut_off", "empty", "folder", "text", "random", "pipe", "forbidden", "missing", "others")}
+    logs["cut_off"].write_bytes(good.read_bytes()[:-1000])
+    logs["empty"].write_bytes(b"")
+    logs["folder"].mkdir()
+    logs["text"].write_text("This is a text, and longer than the head of an event would be, if there was one.\n")
+    logs["random"].write_bytes(random.Random(7).randbytes(300000))
+    os.mkfifo(logs["pipe"])
+    logs["forbidden"].write_bytes(good.read_bytes())
+    logs["forbidden"].chmod(0)
+    logs["others"].write_bytes(b"".join(event(i, b"OTHER_CHANNEL", b"x" * 40) for i in range(20)))
+
+    none = {"folder": "cannot be read", "text": "is no LCM log", "random": "is no LCM log", "pipe": "cannot be read",
+            "forbidden": "cannot be read", "missing": "no such log"}
+    for name, wanted in none.items():
+        for words in VERBS.values():
+            check_one_line([vantage, *words, logs[name]], out, logs[name].name, wanted)
+        check_one_line([play, logs[name]], out, logs[name].name, wanted)
+
+    for verb, words in VERBS.items():
+        if verb != "info":
+            check_one_line([vantage, *words, logs["empty"]], out, "empty.lcm", "there is nothing in this log")
+        code, said, wrong = tell([vantage, *words, logs["cut_off"]], out)
+        check(code == (verb == "verify") and "damaged place" in said, f"{verb} of a log that is cut off: {code}, {said}{wrong}")
+        wanted = {"verify": "none of its 20 messages is on a channel of ours", "csv": "of other types", "bop": "no whole frame",
+                  "replay": "nothing in it to replay"}
+        if verb in wanted:
+            check_one_line([vantage, *words, logs["others"]], out, "others.lcm", wanted[verb])
+    check("there is nothing" in tell([vantage, "log", "info", logs["empty"]], out)[1], "info does not say that a log is empty")
+    check_one_line([play, logs["empty"]], out, "empty.lcm", "there is nothing in this log")
+    check_one_line([play, good, "--speed", "fast"], out, "--speed", "fast")
+    for script in (play, record):
+        check_one_line([script, good if script == play else folder / "new.lcm", "--channels", "["], out, "regular expression")
+    check_one_line([record, good], out, "exists")
+    closed = folder / "closed"
+    closed.mkdir(mode=0o500)
+    check_one_line([record, closed / "new.lcm"], out, "cannot write", "closed")
+    check_one_line([record, logs["text"] / "new.lcm"], out, "cannot write", "text.lcm")
+
+    disk = folder / "disk"
+    disk.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=100k", "none", disk], check=True)
+    try:
+        for verb in ("cut", "filter", "bop", "replay"):
+            words = [*VERBS[verb], *(["--keep-inputs"] if verb == "replay" else [])]
+            check_one_line([vantage, *words, good], disk / "out", "is the disk full?")
+        recorder = subprocess.Popen([record, disk / "new.lcm"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        for _ in range(30):
+            if recorder.poll() is None:
+                subprocess.run([play, good], check=True, stdout=subprocess.DEVNULL)
+        check(recorder.wait(20) != 0, "a recorder on a full disk ends well")
+        said = recorder.stderr.read()
+        check("No space left" in said and said.count("\n") == 1, f"a recorder on a full disk says: {said}")
+    finally:
+        subprocess.run(["umount", "-l", disk], check=True)
 
 
 def main():
