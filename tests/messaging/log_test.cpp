@@ -191,13 +191,21 @@ TEST(LogSummary, AGoodLogHasNoProblems) {
 
 TEST(LogSummary, LcmLoggersOwnDisorderIsNoProblem) {
   Log log;
-  log.Write("OTHERS", {1});
+  log.Write(kObjectPrior, Prior(1));
   log.time_us -= 140000;  // 40 ms late, as around messages in fragments.
-  log.Write("OTHERS", {1});
+  log.Write(kObjectPrior, Prior(2));
   const auto summary = log.Summary();
   EXPECT_EQ(summary.late_events, 1);
   EXPECT_EQ(summary.most_late_us, 40000);
   EXPECT_TRUE(summary.Problems().empty());
+}
+
+TEST(LogSummary, ALogWithNothingOfOursIsWrong) {
+  Log empty, log;
+  EXPECT_EQ(empty.Summary().Problems(), std::vector<std::string>{"there is nothing in this log"});
+  log.Write("OTHERS", {1});
+  log.Write("MORE", {1});
+  EXPECT_EQ(log.Summary().Problems(), std::vector<std::string>{"none of its 2 messages is on a channel of ours"});
 }
 
 TEST(LogSummary, SaysWhatIsWrong) {
