@@ -8,16 +8,15 @@ import hashlib
 import json
 import math
 import os
-import re
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+from short_run import FRAMES, configs, make_log, replay
+
 BIN = Path(sys.argv[1]).resolve()
 EXPECTED = json.loads((Path(__file__).parent / "replay_expected.json").read_text())
-FRAMES, STAND, STEP_DEG = 30, 5, 9
 
 
 def check(name, value, good):
@@ -26,28 +25,8 @@ def check(name, value, good):
         sys.exit(f"replay: {name} is {value}; see {Path(__file__).name}")
 
 
-def changed(file, out, **values):
-    """The shipped file with other values."""
-    text = (ROOT / "config" / file).read_text()
-    for key, value in values.items():
-        text, count = re.subn(rf"^( *{key}:) \S+", rf"\1 {value}", text, flags=re.MULTILINE)
-        if count != 1:
-            sys.exit(f"{key} is not in {file}")
-    out.write_text(text)
-
-
-def configs(folder):
-    processes = folder / "config"
-    processes.mkdir()
-    for name in ("learner", "recogniser", "planner"):
-        changed(f"{name}.yaml", processes / f"{name}.yaml")
-    changed("assessor.yaml", processes / "assessor.yaml", job_frames=8)
-    changed("library.yaml", folder / "library.yaml", trials_per_view=8, negatives_per_view=2)
-
-
 def command(folder, out):
-    return [str(word) for word in (BIN / "vantage", "replay", folder / "log.lcm", "--out", folder / out, "--object", "box", "--config",
-                                   folder / "library.yaml", "--process-configs", folder / "config", "--every-frame")]
+    return replay(BIN, folder, folder / "log.lcm", folder / out)
 
 
 def on_core(core, words):
@@ -92,7 +71,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="vantage-") as name:
         folder = Path(name)
         configs(folder)
-        subprocess.run([BIN / "make_log", folder / "log.lcm", str(FRAMES), str(STAND), str(STEP_DEG)], check=True)
+        make_log(BIN, folder / "log.lcm")
         subprocess.run(command(folder, "0.lcm"), check=True, stdout=subprocess.DEVNULL)
         first = digest(folder / "0.lcm")
         compare(folder)
