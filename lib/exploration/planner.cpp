@@ -13,6 +13,8 @@ void PlannerParams::Check() const {
   require(target_completeness > 0.0 && target_completeness <= 1.0, "target_completeness", "in (0, 1]", target_completeness);
   require(min_detect_probability >= 0.0 && min_detect_probability < 1.0, "min_detect_probability", "in [0, 1)",
           min_detect_probability);
+  require(std::isfinite(attempt_log_odds), "attempt_log_odds", "finite", attempt_log_odds);
+  require(min_view_angle_rad >= 0.0, "min_view_angle_rad", ">= 0", min_view_angle_rad);
   require(t_plan_s >= 0.0, "t_plan_s", ">= 0", t_plan_s);
   require(t_learn_s >= 0.0, "t_learn_s", ">= 0", t_learn_s);
   require(time_budget_s > 0.0, "time_budget_s", "> 0", time_budget_s);

@@ -23,18 +23,22 @@
 namespace vantage::exploration {
 
 struct PlannerParams {
-  double worth_s = 1500.0;               // Seconds that raising completeness from 0 to 1 is worth to this robot; > 0.
-  double target_completeness = 0.97;     // Stop here; (0, 1].
-  double min_detect_probability = 0.25;  // Learning attempts less likely than this are not made; [0, 1).
-  double t_plan_s = 0.5;                 // First guess of the time one decision takes; >= 0. The mean of...
-  double t_learn_s = 1.0;                // ...guess and reports is used. Likewise of one learning attempt.
-  double time_budget_s = 900.0;          // Stop when that much robot time has passed; > 0.
-  int max_attempts = 60;                 // Stop after so many learning attempts; >= 1.
-  bool choose_by_rate = true;            // Among views worth their cost: the most utility a second; false: the most utility.
-  double failure_radius_rad = 0.17;      // An attempt that added no view lowers the belief in views this near to it; >= 0...
-  double failure_discount = 0.3;         // ...by this factor each time, until some view is added; [0, 1).
-  int max_path_goals = 200;              // Paths are planned for so many candidates at once, greatest worth * P * gain first, and
-                                         // for more only while none of those is worth its trip; >= 1.
+  double worth_s = 1500.0;              // Seconds that raising completeness from 0 to 1 is worth to this robot; > 0.
+  double target_completeness = 0.97;    // Stop here; (0, 1].
+  double min_detect_probability = 0.1;  // Learning attempts less likely than this are not made; [0, 1).
+  double attempt_log_odds = 0.7;     // Attempts add views more often than (12) says: the mount tells where to look. First guess of
+                                     // by how much, in log odds; finite. Learned from attempts.
+  double min_view_angle_rad = 0.24;  // Nearer to a learned view, and within a third of an octave of its distance, the learner takes
+                                     // no other: such attempts are not made; >= 0.
+  double t_plan_s = 0.5;             // First guess of the time one decision takes; >= 0. The mean of...
+  double t_learn_s = 1.0;            // ...guess and reports is used. Likewise of one learning attempt.
+  double time_budget_s = 900.0;      // Stop when that much robot time has passed; > 0.
+  int max_attempts = 60;             // Stop after so many learning attempts; >= 1.
+  bool choose_by_rate = true;        // Among views worth their cost: the most utility a second; false: the most utility.
+  double failure_radius_rad = 0.17;  // An attempt that added no view lowers the belief in views this near to it; >= 0...
+  double failure_discount = 0.3;     // ...by this factor each time, until a view is added from where it matters; [0, 1).
+  int max_path_goals = 200;          // Paths are planned for so many candidates at once, greatest worth * P * gain first, and
+                                     // for more only while none of those is worth its trip; >= 1.
   measures::CompletenessRule rule = measures::CompletenessRule::kCommonCause;
 
   void Check() const;  // Throws std::invalid_argument naming the field.
@@ -50,7 +54,7 @@ struct CandidateView {
 // A candidate with everything the decision was made of: a user can see why.
 struct Candidate {
   CandidateView view;
-  double detect_probability = 0.0;  // P(detect): (12) over the learned views, lowered by failures near by.
+  double detect_probability = 0.0;  // P(detect): (12) over the learned views, as attempts bear it out, lowered by failures near by.
   double gain = 0.0;                // Equation (14): completeness with this view added minus completeness now.
   // World; only where it was planned and found. The chosen one is shortened, which may leave t_move_s less than others were told.
   std::optional<motion::Trajectory> path;
@@ -59,8 +63,9 @@ struct Candidate {
   double t_learn_s = 0.0;
   // worth_s * P(detect) * gain - (t_plan + t_move + t_learn); -infinity without a path.
   double utility_s = -std::numeric_limits<double>::infinity();
-  // Why it was not considered; empty where it was. "too unlikely to detect", "no gain", the mount's words ("in collision", "out of
-  // the workspace", "no path found", ...), "path not planned" (see max_path_goals); by baselines also "already tried".
+  // Why it was not considered; empty where it was. "too near to a learned view", "too unlikely to detect", "no gain", the mount's
+  // words ("in collision", "out of the workspace", "no path found", ...), "path not planned" (see max_path_goals); by baselines
+  // also "already tried".
   std::string refusal;
 };
 
@@ -89,6 +94,7 @@ struct Attempt {
   bool view_added = false;
   double t_plan_s = 0.0;   // What it really took; >= 0.
   double t_learn_s = 0.0;  // Likewise.
+  bool looked = true;      // The camera got there: only then the attempt tells of P(detect) and of t_learn_s.
 };
 
 // What the planner knows of the object's model.

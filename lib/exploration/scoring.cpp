@@ -6,6 +6,16 @@
 #include "geometry/rigid.h"
 
 namespace vantage::exploration {
+namespace {
+
+constexpr double kShiftSigma = 1.0;  // Prior of AttemptOdds.
+constexpr double kSurest = 1e-3;     // Single attempts at what is taken for sure or hopeless say no more than this.
+
+double LogOdds(double p) { return std::log(p / (1.0 - p)); }
+double Logistic(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }
+
+}  // namespace
+
 GainScorer::GainScorer(const Belief& belief, measures::CompletenessRule rule) : belief_(belief), rule_(rule) {
   completeness_ = measures::Completeness(belief.views, belief.reachable, belief.predicted, rule);
   double total = 0.0;
@@ -33,12 +43,33 @@ double GainScorer::ValueOf(const measures::JointProbability& joint) const {
   return joint.Value(rule_, belief_.predicted.common_cause());
 }
 
-void FailureMemory::Note(const Attempt& attempt) {
-  if (attempt.view_added) {
-    failures_.clear();
-  } else {
-    failures_.push_back(attempt.viewpoint);
+void AttemptOdds::Note(double predicted, bool added) {
+  outcomes_.push_back({LogOdds(std::clamp(predicted, kSurest, 1.0 - kSurest)), added});
+  for (int iteration = 0; iteration < 20; ++iteration) {  // Newton's method; the posterior has one maximum.
+    double gradient = (first_guess_ - shift_) / (kShiftSigma * kShiftSigma), curvature = 1.0 / (kShiftSigma * kShiftSigma);
+    for (const Outcome& outcome : outcomes_) {
+      const double p = Logistic(outcome.log_odds + shift_);
+      gradient += (outcome.added ? 1.0 : 0.0) - p;
+      curvature += p * (1.0 - p);
+    }
+    shift_ += std::clamp(gradient / curvature, -1.0, 1.0);
   }
+}
+
+double AttemptOdds::Probability(double predicted) const {
+  if (predicted <= 0.0 || predicted >= 1.0) return predicted;
+  return Logistic(LogOdds(predicted) + shift_);
+}
+
+void FailureMemory::Note(const Attempt& attempt) {
+  if (!attempt.view_added) {
+    failures_.push_back(attempt.viewpoint);
+    return;
+  }
+  const auto outdated = [&](const measures::Viewpoint& failure) {
+    return geometry::AngleBetween(failure.direction, attempt.viewpoint.direction) < kMatters_rad;
+  };
+  failures_.erase(std::remove_if(failures_.begin(), failures_.end(), outdated), failures_.end());
 }
 
 double FailureMemory::Factor(const measures::Viewpoint& view) const {

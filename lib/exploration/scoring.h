@@ -34,7 +34,26 @@ class GainScorer {
   double completeness_ = 0.0;
 };
 
-// Attempts that added no view lower the belief in views near by until one is added.
+// How often attempts really add a view where (12) says p: its log odds plus a shift that is the same everywhere, the maximum a
+// posteriori of a logistic model with a Gaussian prior about the first guess.
+class AttemptOdds {
+ public:
+  explicit AttemptOdds(double first_guess) : first_guess_(first_guess), shift_(first_guess) {}
+
+  void Note(double predicted, bool added);
+  double Probability(double predicted) const;  // 0 stays 0, and 1 stays 1.
+
+ private:
+  struct Outcome {
+    double log_odds;
+    bool added;
+  };
+  double first_guess_, shift_;
+  std::vector<Outcome> outcomes_;
+};
+
+// Attempts that added no view lower the belief in views near by until one is added from less than kMatters_rad away: from further
+// off the new view says nothing about the place.
 class FailureMemory {
  public:
   FailureMemory(double radius_rad, double discount) : radius_rad_(radius_rad), discount_(discount) {}
@@ -44,6 +63,8 @@ class FailureMemory {
   double Factor(const measures::Viewpoint& view) const;
 
  private:
+  static constexpr double kMatters_rad = 0.6;
+
   double radius_rad_, discount_;
   std::vector<measures::Viewpoint> failures_;
 };

@@ -9,6 +9,7 @@ SharedStrategy::SharedStrategy(const PlannerParams& params, std::uint32_t seed)
     : params_(params),
       seed_(seed),
       failures_(params.failure_radius_rad, params.failure_discount),
+      odds_(params.attempt_log_odds),
       t_plan_s_(params.t_plan_s),
       t_learn_s_(params.t_learn_s) {}
 
@@ -32,6 +33,7 @@ Decision SharedStrategy::Decide(const Belief& belief, const std::vector<Candidat
   if (decision.chosen < 0) return decision;
   Candidate& chosen = decision.candidates[static_cast<std::size_t>(decision.chosen)];
   last_chosen_id_ = chosen.view.id;
+  last_predicted_ = measures::DetectionProbability(belief.views, chosen.view.viewpoint, belief.predicted, params_.rule);
   chosen.path = mount.Shortened(*chosen.path, DecisionSeed());
   SetCosts(chosen);
   return decision;
@@ -40,8 +42,8 @@ Decision SharedStrategy::Decide(const Belief& belief, const std::vector<Candidat
 void SharedStrategy::Score(const Belief& belief, const GainScorer& scorer, std::vector<Candidate>& candidates) const {
   for (Candidate& candidate : candidates) {
     const measures::Viewpoint& view = candidate.view.viewpoint;
-    candidate.detect_probability =
-        failures_.Factor(view) * measures::DetectionProbability(belief.views, view, belief.predicted, params_.rule);
+    const double predicted = measures::DetectionProbability(belief.views, view, belief.predicted, params_.rule);
+    candidate.detect_probability = failures_.Factor(view) * odds_.Probability(predicted);
     candidate.gain = scorer.Gain(view);
   }
 }
@@ -53,8 +55,10 @@ void SharedStrategy::Report(const Attempt& attempt) {
   attempted_.push_back(attempt.viewpoint);
   failures_.Note(attempt);
   t_plan_s_.Add(attempt.t_plan_s);
-  t_learn_s_.Add(attempt.t_learn_s);
-  if (last_chosen_id_) tried_ids_.insert(*last_chosen_id_);
+  if (attempt.looked) t_learn_s_.Add(attempt.t_learn_s);
+  if (!last_chosen_id_) return;
+  tried_ids_.insert(*last_chosen_id_);
+  if (attempt.looked) odds_.Note(last_predicted_, attempt.view_added);
 }
 
 void SharedStrategy::PlanPaths(const std::vector<Candidate*>& candidates, const motion::Stance& stance,

@@ -48,9 +48,11 @@ class SharedStrategy : public Strategy {
 
   std::uint32_t seed_;
   FailureMemory failures_;
+  AttemptOdds odds_;
   RunningMean t_plan_s_, t_learn_s_;
   std::vector<measures::Viewpoint> attempted_;
   std::optional<int> last_chosen_id_;
+  double last_predicted_ = 0.0;  // (12) at the view chosen last.
   std::set<int> tried_ids_;
 };
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "exploration/shared_strategy.h"
@@ -8,6 +9,7 @@ namespace vantage::exploration {
 namespace {
 
 constexpr double kNoGain = 1e-9;
+constexpr double kSameDistance_octaves = 1.0 / 3.0;  // As the learner has it.
 
 // The utility of section V-C.
 class UtilityStrategy : public SharedStrategy {
@@ -20,7 +22,9 @@ class UtilityStrategy : public SharedStrategy {
     std::vector<Candidate*> queue;  // Reachable and worth something, best first.
     bool any_pays = false;
     for (Candidate& candidate : decision.candidates) {
-      if (candidate.detect_probability < params_.min_detect_probability) {
+      if (IsTooNear(candidate.view.viewpoint, belief)) {
+        candidate.refusal = "too near to a learned view";
+      } else if (candidate.detect_probability < params_.min_detect_probability) {
         candidate.refusal = "too unlikely to detect";
       } else if (candidate.gain <= kNoGain) {
         candidate.refusal = "no gain";
@@ -45,6 +49,13 @@ class UtilityStrategy : public SharedStrategy {
   }
 
  private:
+  bool IsTooNear(const measures::Viewpoint& place, const Belief& belief) const {
+    return std::any_of(belief.views.begin(), belief.views.end(), [&](const measures::Viewpoint& view) {
+      return geometry::AngleBetween(view.direction, place.direction) < params_.min_view_angle_rad &&
+             std::abs(std::log2(view.distance_m / place.distance_m)) < kSameDistance_octaves;
+    });
+  }
+
   // Without any place to see the object from, no view gains anything: the mount's words are the better reason.
   static bool AllRefused(Decision& decision, const motion::Mount& mount) {
     for (Candidate& candidate : decision.candidates) {

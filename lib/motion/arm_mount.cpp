@@ -1,12 +1,9 @@
 // The arm as a mount: one lazy PRM (OMPL; Bohlin and Kavraki, 2000) in joint space for all goals of a decision. Roadmap edges are
 // checked only where they lie on a shortest path, which for many goals from one start is a small part of them.
-#include <ompl/base/MotionValidator.h>
 #include <ompl/base/ProblemDefinition.h>
 #include <ompl/base/SpaceInformation.h>
 #include <ompl/base/spaces/RealVectorStateSpace.h>
 #include <ompl/datastructures/NearestNeighborsLinear.h>
-#include <ompl/geometric/PathGeometric.h>
-#include <ompl/geometric/PathSimplifier.h>
 #include <ompl/geometric/planners/prm/LazyPRM.h>
 
 #include <array>
@@ -20,6 +17,7 @@
 #include "motion/arm_collision.h"
 #include "motion/arm_ik.h"
 #include "motion/joint_path.h"
+#include "motion/ompl_support.h"
 
 namespace vantage::motion {
 namespace {
@@ -72,31 +70,6 @@ class JointSpace : public ob::RealVectorStateSpace {
 
  private:
   Joints speeds_;
-};
-
-class ArmMotionValidator : public ob::MotionValidator {
- public:
-  ArmMotionValidator(const ob::SpaceInformationPtr& space, const ArmCollision& collision)
-      : MotionValidator(space), collision_(collision), joints_(space->getStateDimension()) {}
-
-  bool checkMotion(const ob::State* from, const ob::State* to) const override {
-    return collision_.IsMoveFree(ToJoints(from, joints_), ToJoints(to, joints_));
-  }
-  bool checkMotion(const ob::State* from, const ob::State* to, std::pair<ob::State*, double>& last_valid) const override {
-    if (checkMotion(from, to)) return true;
-    if (last_valid.first != nullptr) si_->copyState(last_valid.first, from);
-    last_valid.second = 0.0;
-    return false;
-  }
-
- private:
-  const ArmCollision& collision_;
-  Eigen::Index joints_;
-};
-
-class SeededSimplifier : public og::PathSimplifier {
- public:
-  SeededSimplifier(const ob::SpaceInformationPtr& space, std::uint32_t seed) : PathSimplifier(space) { rng_.setLocalSeed(seed); }
 };
 
 // OMPL's lazy PRM, with milestones that are given to it and shortest paths from one of them to all others.
@@ -215,7 +188,9 @@ class ArmMount : public Mount {
     auto space = std::make_shared<JointSpace>(*arm_);
     space_ = std::make_shared<ob::SpaceInformation>(space);
     space_->setStateValidityChecker([this, count](const ob::State* state) { return collision_.IsFree(ToJoints(state, count)); });
-    space_->setMotionValidator(std::make_shared<ArmMotionValidator>(space_, collision_));
+    space_->setMotionValidator(std::make_shared<MoveValidator>(space_, [this, count](const ob::State* from, const ob::State* to) {
+      return collision_.IsMoveFree(ToJoints(from, count), ToJoints(to, count));
+    }));
     space_->setup();
   }
 
@@ -367,10 +342,7 @@ Trajectory ArmMount::Shortened(const Trajectory& path, std::uint32_t seed) const
     Assign(path.Sample(path.duration_s() * i / pieces).joints_rad, state.get());
     states.append(state.get());
   }
-  SeededSimplifier simplifier(space_, seed);
-  simplifier.reduceVertices(states, kShorteningSteps, kShorteningSteps);
-  simplifier.shortcutPath(states, kShorteningSteps, kShorteningSteps);
-  simplifier.reduceVertices(states, kShorteningSteps, kShorteningSteps);
+  CutShort(seed, kShorteningSteps, states);
   std::vector<Joints> corners;
   for (const ob::State* vertex : states.getStates()) corners.push_back(ToJoints(vertex, arm_->joints()));
   for (const double cut_m : {kWideCut_m, kSafeCut_m}) {

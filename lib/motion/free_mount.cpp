@@ -1,10 +1,7 @@
-#include <ompl/base/MotionValidator.h>
 #include <ompl/base/ProblemDefinition.h>
 #include <ompl/base/SpaceInformation.h>
 #include <ompl/base/spaces/RealVectorStateSpace.h>
 #include <ompl/datastructures/NearestNeighborsLinear.h>
-#include <ompl/geometric/PathGeometric.h>
-#include <ompl/geometric/PathSimplifier.h>
 #include <ompl/geometric/planners/prm/PRM.h>
 
 #include <boost/graph/dijkstra_shortest_paths.hpp>
@@ -14,6 +11,7 @@
 #include <stdexcept>
 
 #include "motion/mount.h"
+#include "motion/ompl_support.h"
 
 namespace vantage::motion {
 namespace {
@@ -40,31 +38,7 @@ void Assign(const Position& position, ob::State* state) {
   for (unsigned i = 0; i < 3; ++i) state->as<ob::RealVectorStateSpace::StateType>()->values[i] = position[i];
 }
 
-class CapsuleMotionValidator : public ob::MotionValidator {
- public:
-  CapsuleMotionValidator(const ob::SpaceInformationPtr& space, const CollisionWorld& world)
-      : MotionValidator(space), world_(world) {}
-
-  bool checkMotion(const ob::State* from, const ob::State* to) const override {
-    return world_.IsMoveFree(ToPosition(from), ToPosition(to));
-  }
-  bool checkMotion(const ob::State* from, const ob::State* to, std::pair<ob::State*, double>& last_valid) const override {
-    if (checkMotion(from, to)) return true;
-    if (last_valid.first != nullptr) si_->copyState(last_valid.first, from);
-    last_valid.second = 0.0;
-    return false;
-  }
-
- private:
-  const CollisionWorld& world_;
-};
-
-// OMPL's generators are seeded from a process-wide sequence; these use their own, so that equal seeds give equal paths.
-class SeededSimplifier : public og::PathSimplifier {
- public:
-  SeededSimplifier(const ob::SpaceInformationPtr& space, std::uint32_t seed) : PathSimplifier(space) { rng_.setLocalSeed(seed); }
-};
-
+// OMPL's generators are seeded from a process-wide sequence; this uses its own, so that equal seeds give equal paths.
 class SeededSampler : public ob::RealVectorStateSampler {
  public:
   SeededSampler(const ob::StateSpace* space, std::uint32_t seed) : RealVectorStateSampler(space) { rng_.setLocalSeed(seed); }
@@ -173,7 +147,9 @@ ob::SpaceInformationPtr FreeMount::MakeSpace() const {
   space->setBounds(bounds);
   auto information = std::make_shared<ob::SpaceInformation>(space);
   information->setStateValidityChecker([this](const ob::State* state) { return world_.IsFree(ToPosition(state)); });
-  information->setMotionValidator(std::make_shared<CapsuleMotionValidator>(information, world_));
+  information->setMotionValidator(std::make_shared<MoveValidator>(information, [this](const ob::State* from, const ob::State* to) {
+    return world_.IsMoveFree(ToPosition(from), ToPosition(to));
+  }));
   information->setup();
   return information;
 }
@@ -207,10 +183,7 @@ std::vector<Position> FreeMount::Shortened(const ob::SpaceInformationPtr& space,
     Assign(position, state.get());
     states.append(state.get());
   }
-  SeededSimplifier simplifier(space, seed);
-  simplifier.reduceVertices(states, kShorteningSteps, kShorteningSteps);
-  simplifier.shortcutPath(states, kShorteningSteps, kShorteningSteps);
-  simplifier.reduceVertices(states, kShorteningSteps, kShorteningSteps);
+  CutShort(seed, kShorteningSteps, states);
   std::vector<Position> shortened;
   for (const ob::State* vertex : states.getStates()) shortened.push_back(ToPosition(vertex));
   return shortened;

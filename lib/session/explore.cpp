@@ -1,16 +1,25 @@
 #include "session/explore.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 #include <stdexcept>
 
 #include "assessment/background.h"
-#include "learning/scene.h"
+#include "geometry/rigid.h"
+#include "session/scene_map.h"
 
 namespace vantage::session {
 namespace {
 
 constexpr double kAuditStep_s = 0.01;
 constexpr double kMinShareInView = 0.7;  // A recorded pose is a candidate where this share of the model would be in the image.
+
+// A frame is an attempt, seconds after the last one: a refinement begun then is done by now.
+learning::LearnerParams InLockStep(learning::LearnerParams params) {
+  params.refine_delay_frames = std::min(params.refine_delay_frames, 1);
+  return params;
+}
 
 // One run: the robot's state and what it has learned.
 class Run {
@@ -23,7 +32,7 @@ class Run {
         judge_(judge),
         store_(store),
         progress_(progress),
-        learner_(params.learner, start.object_name),
+        learner_(InLockStep(params.learner), start.object_name),
         mounts_(params.mount),
         strategy_(exploration::MakeStrategy(params.strategy, params.planner, params.seed, params.outcomes)) {}
 
@@ -43,7 +52,7 @@ class Run {
     stance_ = mounts_.Make({})->StanceAt(start_.T_world_camera).value_or(motion::Stance(*frame.T_world_camera));
     const learning::LearnerResult first = learner_.Process(frame, start_.target);
     if (!first.view_added) throw std::runtime_error("no object was found from the start pose: " + first.note);
-    NoteScene(frame);
+    NoteScene(frame, true);
     result_.time.learn_s += params_.planner.t_learn_s;
     LearnedView(frame);
     Tell("first view", nullptr);
@@ -74,6 +83,8 @@ class Run {
     const rgbd::Frame frame = world_.Look(end.T_world_mount, params_.seed + 1000u * result_.attempts);
     stance_ = {*frame.T_world_camera, end.joints_rad};
     const learning::LearnerResult learned = learner_.Process(frame);
+    NoteScene(frame, learned.view_added);
+    Log(chosen, learned);
     exploration::Attempt attempt;
     attempt.viewpoint = chosen.view.viewpoint;
     attempt.detected = learned.state == learning::State::kTracking;
@@ -88,6 +99,27 @@ class Run {
       ++result_.failed_attempts;
     }
     Tell(learned.view_added ? "view added" : learned.note, &decision);
+  }
+
+  void Log(const exploration::Candidate& chosen, const learning::LearnerResult& learned) {
+    const exploration::Belief belief = BeliefNow();
+    const auto before = static_cast<std::ptrdiff_t>(belief.views.size()) - (learned.view_added ? 1 : 0);
+    const std::vector<measures::Viewpoint> views(belief.views.begin(), belief.views.begin() + before);
+    ExploreAttempt entry;
+    entry.time_s = result_.time.total_s();
+    entry.predicted = measures::DetectionProbability(views, chosen.view.viewpoint, belief.predicted, params_.planner.rule);
+    entry.detect_probability = chosen.detect_probability;
+    entry.gain = chosen.gain;
+    entry.nearest_view_rad = M_PI;
+    for (const measures::Viewpoint& view : views) {
+      entry.nearest_view_rad =
+          std::min(entry.nearest_view_rad, geometry::AngleBetween(view.direction, chosen.view.viewpoint.direction));
+    }
+    entry.move_s = chosen.t_move_s;
+    entry.detected = learned.state == learning::State::kTracking;
+    entry.view_added = learned.view_added;
+    entry.note = learned.note;
+    result_.log.push_back(entry);
   }
 
   void Audit(const motion::Trajectory& path) {
@@ -123,9 +155,8 @@ class Run {
     result_.completeness = CompletenessNow();
     if (store_) store_->SaveMeasures(object->name, learner_.object()->measures, result_.completeness);
     result_.completeness_over_time.emplace_back(result_.time.total_s(), result_.completeness);
-    if (judge_ && params_.judge_over_time && newest % params_.judge_every_views == 0) {
-      result_.true_rate_over_time.emplace_back(result_.time.total_s(), TrueRate());
-      judged_views_ = newest + 1;
+    if (judge_ && params_.judge_over_time) {
+      result_.true_rate_over_time.emplace_back(result_.time.total_s(), TrueRateSince(object->views.back().viewpoint().direction));
     }
   }
 
@@ -136,17 +167,28 @@ class Run {
     backgrounds_.push_back({assessment::MaskedBackground(frame.color, objects), nullptr});
   }
 
-  void NoteScene(const rgbd::Frame& frame) {
+  // All that stands on the table, recognised or not, in every frame. The learner looks for it only where it learns.
+  void NoteScene(const rgbd::Frame& frame, bool learned) {
+    if (learned) {
+      scene_.Add(frame, *learner_.plane(), learner_.clusters());
+    } else if (const auto plane = segmentation::FitPlane(frame, params_.learner.plane)) {
+      scene_.Add(frame, *plane, segmentation::FindClusters(frame, *plane, params_.learner.clusters));
+    }
     obstacles_ = world_.Furniture();
-    for (const segmentation::Cluster& cluster : learner_.clusters()) {
-      auto points = learning::ClusterHullPoints(frame, *learner_.plane(), cluster);
-      if (points.size() >= 4) obstacles_.hulls.push_back({"object " + std::to_string(obstacles_.hulls.size()), std::move(points)});
+    obstacles_.hulls = scene_.hulls();
+  }
+
+  // Where the camera could go, given where the object stands, and where it can from what is known by now.
+  void ListCandidates() {
+    if (candidates_.empty()) MakeCandidates();
+    reachable_.clear();
+    const auto mount = mounts_.Make(obstacles_);
+    for (const exploration::CandidateView& candidate : candidates_) {
+      if (mount->WhyUnreachable(candidate.T_world_camera).empty()) reachable_.push_back({candidate.viewpoint, 1.0});
     }
   }
 
-  // Where the camera could go, given where the object stands.
-  void ListCandidates() {
-    if (!candidates_.empty()) return;
+  void MakeCandidates() {
     const geometry::Rigid T_world_object = *learner_.T_world_object();
     const std::vector<geometry::Rigid> recorded = world_.Viewpoints();
     if (recorded.empty()) {
@@ -156,10 +198,6 @@ class Run {
     for (size_t i = 0; i < recorded.size(); ++i) {
       if (ShareInImage(points, recorded[i].inverse() * T_world_object, world_.Camera()) < kMinShareInView) continue;
       candidates_.push_back({static_cast<int>(i), recorded[i], exploration::ViewpointOf(recorded[i], T_world_object)});
-    }
-    const auto mount = mounts_.Make(obstacles_);
-    for (const exploration::CandidateView& candidate : candidates_) {
-      if (mount->WhyUnreachable(candidate.T_world_camera).empty()) reachable_.push_back({candidate.viewpoint, 1.0});
     }
   }
 
@@ -173,8 +211,18 @@ class Run {
     return measures::Completeness(belief.views, belief.reachable, belief.predicted, params_.planner.rule);
   }
 
-  double TrueRate() const {
-    return judge_->TrueDetectionRate(learner_.object(), start_.T_world_mesh.inverse() * *learner_.T_world_object());
+  geometry::Rigid T_mesh_object() const { return start_.T_world_mesh.inverse() * *learner_.T_world_object(); }
+
+  // Now that a view was learned from there.
+  double TrueRateSince(const Eigen::Vector3d& direction) {
+    outcomes_.resize(static_cast<std::size_t>(judge_->size()), 0);
+    std::vector<char> asked = judge_->Near(direction, T_mesh_object(), params_.judge_within_deg * M_PI / 180.0);
+    for (std::size_t i = 0; i < asked.size(); ++i) asked[i] = static_cast<char>(asked[i] != 0 || outcomes_[i] == 0);
+    const std::vector<char> now = judge_->Outcomes(learner_.object(), T_mesh_object(), asked);
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      if (asked[i] != 0) outcomes_[i] = now[i];
+    }
+    return std::accumulate(outcomes_.begin(), outcomes_.end(), 0.0) / std::max(1, judge_->size());
   }
 
   void Finish() {
@@ -182,9 +230,7 @@ class Run {
     result_.object = learner_.object();
     result_.views = static_cast<int>(result_.object->views.size());
     result_.completeness = CompletenessNow();
-    if (!judge_) return;
-    const bool judged = judged_views_ == result_.views;
-    result_.true_detection_rate = judged ? result_.true_rate_over_time.back().second : TrueRate();
+    if (judge_) result_.true_detection_rate = judge_->TrueDetectionRate(result_.object, T_mesh_object());
   }
 
   void Tell(const std::string& note, const exploration::Decision* decision) const {
@@ -204,12 +250,13 @@ class Run {
   motion::MountMaker mounts_;
   std::unique_ptr<exploration::Strategy> strategy_;
   motion::Stance stance_;  // Now.
+  SceneMap scene_;
   motion::Obstacles obstacles_;
   std::vector<assessment::Background> backgrounds_;
   std::vector<assessment::Trial> trials_;
   std::vector<exploration::CandidateView> candidates_;
   std::vector<measures::WeightedViewpoint> reachable_;
-  int judged_views_ = 0;  // How many views the model had when it was judged last.
+  std::vector<char> outcomes_;  // Of the judging views, when they were judged last.
   ExploreResult result_;
 };
 
@@ -225,7 +272,9 @@ void ExploreParams::Check() const {
   if (std::find(names.begin(), names.end(), strategy) == names.end()) {
     throw std::invalid_argument("explore: strategy is unknown: \"" + strategy + "\"");
   }
-  if (judge_every_views < 1) throw std::invalid_argument("explore: judge_every_views must be >= 1");
+  if (!(judge_within_deg > 0.0 && judge_within_deg <= 180.0)) {
+    throw std::invalid_argument("explore: judge_within_deg must be in (0, 180]");
+  }
   if (max_backgrounds < 0) throw std::invalid_argument("explore: max_backgrounds must be >= 0");
 }
 

@@ -28,9 +28,11 @@ struct ExploreParams {
   std::string strategy = "planner";  // A name of exploration::StrategyNames().
   // What the strategy "oracle" knows; null for the others. Must outlive the run.
   const exploration::OutcomeTable* outcomes = nullptr;
-  int max_backgrounds = 8;      // Own frames, objects masked, that virtual views are pasted over; >= 0.
-  bool judge_over_time = true;  // Judge the model on the way, not only at the end...
-  int judge_every_views = 1;    // ...after every so many views; >= 1.
+  int max_backgrounds = 8;  // Own frames, objects masked, that virtual views are pasted over; >= 0.
+  // Judge the model after every view, not only at the end: by the judging views it was not detected in so far, and again by those
+  // that see it from less than judge_within_deg of the new view, as little changes for the others. 180 = all.
+  bool judge_over_time = true;
+  double judge_within_deg = 30.0;  // (0, 180].
   std::uint32_t seed = 0;
 
   void Check() const;  // Throws std::invalid_argument naming the field.
@@ -52,6 +54,18 @@ struct ExploreAudit {
   std::string obstacle;                      // To what.
 };
 
+// One attempt as it was decided on and what came of it.
+struct ExploreAttempt {
+  double time_s = 0.0;              // Robot time when it was over.
+  double predicted = 0.0;           // (12) over the views learned before, and...
+  double detect_probability = 0.0;  // ...what the strategy made of it.
+  double gain = 0.0;
+  double nearest_view_rad = 0.0;  // Angle to the nearest learned view.
+  double move_s = 0.0;
+  bool detected = false, view_added = false;
+  std::string note;  // The learner's.
+};
+
 struct ExploreResult {
   std::string strategy;
   std::uint32_t seed = 0;
@@ -64,6 +78,7 @@ struct ExploreResult {
   std::vector<std::pair<double, double>> true_rate_over_time;     // Likewise; empty where not judged.
   std::optional<double> true_detection_rate;
   std::string stop_reason;
+  std::vector<ExploreAttempt> log;
   ExploreAudit audit;
   std::shared_ptr<const model::ObjectModel> object;  // Null where no object was found at the start.
 };

@@ -3,6 +3,8 @@
 #include <numeric>
 #include <opencv2/core/utility.hpp>
 
+#include "geometry/rigid.h"
+
 namespace vantage::session {
 namespace {
 
@@ -49,6 +51,15 @@ std::vector<char> Judge::Outcomes(std::shared_ptr<const model::ObjectModel> obje
     }
   });
   return right;
+}
+
+std::vector<char> Judge::Near(const Eigen::Vector3d& direction, const geometry::Rigid& T_mesh_object, double max_angle_rad) const {
+  std::vector<char> near;
+  for (const JudgeView& view : views_) {
+    const Eigen::Vector3d camera_in_object = (view.T_camera_mesh * T_mesh_object).inverse().translation();
+    near.push_back(static_cast<char>(geometry::AngleBetween(camera_in_object, direction) < max_angle_rad));
+  }
+  return near;
 }
 
 bool Judge::IsDetected(const recognition::Recogniser& recogniser, const JudgeView& view,

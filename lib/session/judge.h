@@ -35,6 +35,8 @@ class Judge {
   // The same view by view: != 0 where it is detected. Views with 0 in `asked` (same order, or empty: all are) are not looked at.
   std::vector<char> Outcomes(std::shared_ptr<const model::ObjectModel> object, const geometry::Rigid& T_mesh_object,
                              const std::vector<char>& asked = {}) const;
+  // Which views see the object from less than `max_angle_rad` off a direction (object coordinates, unit): != 0.
+  std::vector<char> Near(const Eigen::Vector3d& direction, const geometry::Rigid& T_mesh_object, double max_angle_rad) const;
 
  private:
   bool IsDetected(const recognition::Recogniser& recogniser, const JudgeView& view, const geometry::Rigid& T_mesh_object) const;

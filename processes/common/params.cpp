@@ -238,6 +238,8 @@ void Fields(Visitor& visit, exploration::PlannerParams& params) {
   visit("worth_s", params.worth_s);
   visit("target_completeness", params.target_completeness);
   visit("min_detect_probability", params.min_detect_probability);
+  visit("attempt_log_odds", params.attempt_log_odds);
+  visit("min_view_angle_rad", params.min_view_angle_rad);
   visit("t_plan_s", params.t_plan_s);
   visit("t_learn_s", params.t_learn_s);
   visit("time_budget_s", params.time_budget_s);

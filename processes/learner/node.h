@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "learner/scene_map.h"
 #include "learning/learner.h"
 #include "messaging/assessor_messages.h"
 #include "messaging/frame_link.h"
 #include "messaging/learner_messages.h"
 #include "messaging/node.h"
 #include "model/store.h"
+#include "session/scene_map.h"
 
 namespace vantage::learner {
 
@@ -62,7 +62,7 @@ class LearnerNode : public messaging::Node {
   std::unique_ptr<learning::Learner> learner_;
   bool unsaved_ = false;     // The model has changed since it was written.
   int announced_view_ = -1;  // Id of the newest view that was told of.
-  SceneMap scene_;
+  session::SceneMap scene_;
   std::int64_t scene_utime_ = 0;
   std::int64_t next_scene_us_ = 0;
   std::int64_t next_frame_us_ = 0;

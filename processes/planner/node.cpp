@@ -273,6 +273,7 @@ void PlannerNode::EndAttempt(bool reached) {
   attempt.view_added = views() > views_at_departure_;
   attempt.detected = reached && (look_.detected || attempt.view_added);
   attempt.t_plan_s = plan_s_;
+  attempt.looked = reached;
   attempt.t_learn_s = reached ? ElapsedSince(look_.since_us) : 0.0;
   strategy_->Report(attempt);
   total_learn_s_ += attempt.t_learn_s;

@@ -11,8 +11,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kJudgeEveryViews = 3;  // In simulated worlds: judging is what takes longest.
-
 struct World {
   std::string name;
   Scenario scenario;
@@ -138,7 +136,6 @@ void Compare(const ExploreOptions& given) {
         options.strategy = strategy;
         session::ExploreParams explore = ParamsOf(options, params, world.scenario, seed);
         explore.judge_over_time = true;
-        explore.judge_every_views = world.scenario.judge_over_time ? 1 : kJudgeEveryViews;
         if (strategy == "oracle") {
           if (world.outcomes.viewpoints.empty()) {
             world.outcomes = OutcomesOf(world, explore, folder / ("outcomes-" + world.name + ".json"), settings);

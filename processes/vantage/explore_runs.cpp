@@ -1,5 +1,6 @@
 #include "vantage/explore_runs.h"
 
+#include <cmath>
 #include <random>
 #include <sstream>
 
@@ -28,6 +29,18 @@ Json ToJson(const session::ExploreResult& run) {
   entry["true_rate_over_time"] = ToJson(run.true_rate_over_time);
   entry["true_detection_rate"] = run.true_detection_rate ? Number(*run.true_detection_rate) : Json(nullptr);
   entry["stop_reason"] = run.stop_reason;
+  entry["attempts_made"] = Json::array();
+  for (const session::ExploreAttempt& attempt : run.log) {
+    entry["attempts_made"].push_back({{"time_s", attempt.time_s},
+                                      {"predicted", Number(attempt.predicted)},
+                                      {"detect_probability", Number(attempt.detect_probability)},
+                                      {"gain", Number(attempt.gain)},
+                                      {"nearest_view_deg", attempt.nearest_view_rad * 180.0 / M_PI},
+                                      {"move_s", attempt.move_s},
+                                      {"detected", attempt.detected},
+                                      {"view_added", attempt.view_added},
+                                      {"note", attempt.note}});
+  }
   entry["audit"] = {{"paths", run.audit.paths},
                     {"touching", run.audit.touching},
                     {"clearance_m", run.audit.clearance_m},

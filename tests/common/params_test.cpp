@@ -121,6 +121,16 @@ TEST(Params, TheHandEyeFileIsFoundBesideAndRefusedInOneClearLine) {
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("hand.yaml"), std::string::npos) << error.what();
   }
+
+TEST(Params, TheShippedComparisonsAreThere) {
+  const auto folder = std::filesystem::path(VANTAGE_SOURCE_DIR) / "config";
+  const LibraryParams free = LoadLibraryParams(folder / "library_compare.yaml");
+  const LibraryParams arm = LoadLibraryParams(folder / "library_compare_arm.yaml");
+  EXPECT_EQ(arm.mount.type, "arm");
+  EXPECT_TRUE(std::filesystem::exists(arm.mount.arm.urdf));
+  EXPECT_EQ(arm.trials.trials_per_view, free.trials.trials_per_view);
+  EXPECT_EQ(arm.planner.time_budget_s, free.planner.time_budget_s);
+  EXPECT_EQ(LoadLibraryParams(folder / "library_compare_photographs.yaml").mount.type, "free");
 }
 
 TEST(Params, ErrorsNameFileAndLine) {

@@ -17,17 +17,27 @@ double AngleFrom(const Candidate& candidate, double azimuth_deg) {
   return geometry::AngleBetween(candidate.view.viewpoint.direction, Direction(azimuth_deg)) / kDegree;
 }
 
+// Attempts succeed as often as the measures say.
+PlannerParams AsMeasured() {
+  PlannerParams params;
+  params.attempt_log_odds = 0.0;
+  params.min_view_angle_rad = 0.0;
+  return params;
+}
+
 TEST(Planner, LearnsAtTheFringeOfWhatIsKnown) {
   const auto ring = Ring(5.0);
+  PlannerParams params;
+  params.choose_by_rate = false;
   const Decision decision =
-      MakeStrategy("planner", {}, 0)->Decide(BeliefFrom({ring[0]}, ring), ring, ring[0].T_world_camera, TestMount(), 0.0);
+      MakeStrategy("planner", params, 0)->Decide(BeliefFrom({ring[0]}, ring), ring, ring[0].T_world_camera, TestMount(), 0.0);
   ASSERT_GE(decision.chosen, 0);
   EXPECT_EQ(decision.stop, StopReason::kNone);
   // Certain to be detected within 10 degrees, but nothing to learn; hopeless from 45 on.
   EXPECT_GT(AngleFrom(Chosen(decision), 0.0), 14.0);
   EXPECT_LT(AngleFrom(Chosen(decision), 0.0), 40.0);
   for (const Candidate& candidate : decision.candidates) EXPECT_LE(candidate.utility_s, Chosen(decision).utility_s);
-  EXPECT_EQ(decision.candidates[0].refusal, "no gain");
+  EXPECT_EQ(decision.candidates[1].refusal, "too near to a learned view");
   EXPECT_EQ(decision.candidates[36].refusal, "too unlikely to detect");
 }
 
@@ -39,7 +49,7 @@ TEST(Planner, EveryCandidateCarriesItsOwnReasons) {
   mount.no_path = [](const geometry::Rigid& pose) { return pose.translation().y() > 0.2 ? "no path found" : ""; };
   for (const auto rule : measures::kCompletenessRules) {
     SCOPED_TRACE(ToString(rule));
-    PlannerParams params;
+    PlannerParams params = AsMeasured();
     params.worth_s = 600.0;
     params.rule = rule;
     params.max_path_goals = 3;
@@ -126,6 +136,7 @@ TEST(Planner, AFailureChangesTheChoiceUntilAViewIsAdded) {
   Attempt attempt;
   attempt.viewpoint = Chosen(before).view.viewpoint;
   attempt.detected = true;  // Seen, but no view came of it: as bad.
+  attempt.looked = false;   // Of how often attempts detect it shall say nothing here.
   attempt.t_plan_s = 0.5;
   attempt.t_learn_s = 1.0;
   strategy->Report(attempt);
@@ -136,6 +147,10 @@ TEST(Planner, AFailureChangesTheChoiceUntilAViewIsAdded) {
   EXPECT_EQ(decide().chosen, after.chosen) << "asking again is not another attempt";
   attempt.view_added = true;
   attempt.viewpoint = {Direction(180.0), 0.6};
+  strategy->Report(attempt);
+  EXPECT_NEAR(decide().candidates[index].detect_probability, after.candidates[index].detect_probability, 1e-12)
+      << "what was learned on the other side changes nothing here";
+  attempt.viewpoint = {Direction(0.0), 0.6};
   strategy->Report(attempt);
   EXPECT_NEAR(decide().candidates[index].detect_probability, before.candidates[index].detect_probability, 1e-12);
 }
@@ -155,6 +170,30 @@ TEST(Planner, LearnsWhatThingsReallyTake) {
   EXPECT_NEAR(candidate.t_learn_s, (1.0 + 9 * 4.0) / 10, 1e-12);
   attempt.t_learn_s = -1.0;
   EXPECT_THROW(strategy->Report(attempt), std::invalid_argument);
+}
+
+TEST(Planner, LearnsHowOftenAttemptsDetect) {
+  const auto ring = Ring(5.0);
+  const Belief belief = BeliefFrom({ring[0]}, ring);
+  for (const bool detected : {false, true}) {
+    const auto strategy = MakeStrategy("planner", AsMeasured(), 0);
+    const auto probability = [&] {
+      return strategy->Decide(belief, ring, ring[0].T_world_camera, TestMount(), 0.0).candidates[5].detect_probability;
+    };
+    const double predicted = measures::DetectionProbability(belief.views, ring[5].viewpoint, belief.predicted);
+    ASSERT_GT(predicted, 0.3);
+    ASSERT_LT(predicted, 0.9);
+    EXPECT_NEAR(probability(), predicted, 1e-12);
+    for (int i = 0; i < 12; ++i) {
+      probability();
+      strategy->Report({{Direction(180.0), 0.6}, detected, detected, 0.5, 1.0});
+    }
+    if (detected) {
+      EXPECT_GT(probability(), predicted + 0.05);
+    } else {
+      EXPECT_LT(probability(), predicted - 0.1);
+    }
+  }
 }
 
 TEST(Planner, PlansFurtherPathsWhereTheBestAreRefused) {

@@ -8,7 +8,7 @@
 #include "rgbd/frame.h"
 #include "segmentation/clusters.h"
 
-namespace vantage::learner {
+namespace vantage::session {
 
 class SceneMap {
  public:
@@ -30,4 +30,4 @@ class SceneMap {
 // The points that are extreme in one of `directions` even directions: a small set with nearly the same hull.
 std::vector<Eigen::Vector3d> ExtremePoints(const std::vector<Eigen::Vector3d>& points, int directions);
 
-}  // namespace vantage::learner
+}  // namespace vantage::session

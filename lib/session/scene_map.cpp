@@ -1,4 +1,4 @@
-#include "learner/scene_map.h"
+#include "session/scene_map.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -6,7 +6,7 @@
 #include "geometry/view_sphere.h"
 #include "learning/scene.h"
 
-namespace vantage::learner {
+namespace vantage::session {
 namespace {
 
 constexpr int kHullDirections = 96;
@@ -73,4 +73,4 @@ void SceneMap::AddHull(std::vector<Eigen::Vector3d> points_in_world) {
   for (std::size_t i = 0; i < hulls_.size(); ++i) hulls_[i].name = "object " + std::to_string(i);
 }
 
-}  // namespace vantage::learner
+}  // namespace vantage::session
