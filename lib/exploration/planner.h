@@ -26,16 +26,16 @@ struct PlannerParams {
   double worth_s = 1500.0;              // Seconds that raising completeness from 0 to 1 is worth to this robot; > 0.
   double target_completeness = 0.97;    // Stop here; (0, 1].
   double min_detect_probability = 0.1;  // Learning attempts less likely than this are not made; [0, 1).
-  double attempt_log_odds = 0.7;     // Attempts add views more often than (12) says: the mount tells where to look. First guess of
-                                     // by how much, in log odds; finite. Learned from attempts.
-  double min_view_angle_rad = 0.24;  // Nearer to a learned view, and within a third of an octave of its distance, the learner takes
-                                     // no other: such attempts are not made; >= 0.
+  double attempt_log_odds = 0.7;        // Attempts detect more often than (12) says: the mount tells where to look. First guess of
+                                        // by how much, in log odds; finite. Learned from attempts.
+  double min_view_angle_rad = 0.24;  // Nearer to a learned view (or to where all was well known), and within a third of an octave
+                                     // of its distance, the learner takes no other: such attempts are not made; >= 0.
   double t_plan_s = 0.5;             // First guess of the time one decision takes; >= 0. The mean of...
   double t_learn_s = 1.0;            // ...guess and reports is used. Likewise of one learning attempt.
   double time_budget_s = 900.0;      // Stop when that much robot time has passed; > 0.
   int max_attempts = 60;             // Stop after so many learning attempts; >= 1.
   bool choose_by_rate = true;        // Among views worth their cost: the most utility a second; false: the most utility.
-  double failure_radius_rad = 0.17;  // An attempt that added no view lowers the belief in views this near to it; >= 0...
+  double failure_radius_rad = 0.17;  // An attempt that did not detect it lowers the belief in views this near; >= 0...
   double failure_discount = 0.3;     // ...by this factor each time, until a view is added from where it matters; [0, 1).
   int max_path_goals = 200;          // Paths are planned for so many candidates at once, greatest worth * P * gain first, and
                                      // for more only while none of those is worth its trip; >= 1.

@@ -16,13 +16,16 @@ double Logistic(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }
 
 }  // namespace
 
-GainScorer::GainScorer(const Belief& belief, measures::CompletenessRule rule) : belief_(belief), rule_(rule) {
+GainScorer::GainScorer(const Belief& belief, measures::CompletenessRule rule, const std::vector<measures::Viewpoint>& well_known)
+    : belief_(belief), rule_(rule) {
+  std::vector<measures::Viewpoint> views = belief.views;
+  views.insert(views.end(), well_known.begin(), well_known.end());
   completeness_ = measures::Completeness(belief.views, belief.reachable, belief.predicted, rule);
   double total = 0.0;
   for (const measures::WeightedViewpoint& query : belief.reachable) total += query.weight;
   for (const measures::WeightedViewpoint& query : belief.reachable) {
     if (query.weight == 0.0) continue;
-    const auto so_far = measures::Joint(belief.views, query.viewpoint, belief.predicted);
+    const auto so_far = measures::Joint(views, query.viewpoint, belief.predicted);
     if (ValueOf(so_far) < 1.0) queries_.push_back({query.viewpoint, query.weight / total, so_far});
   }
 }
@@ -43,13 +46,13 @@ double GainScorer::ValueOf(const measures::JointProbability& joint) const {
   return joint.Value(rule_, belief_.predicted.common_cause());
 }
 
-void AttemptOdds::Note(double predicted, bool added) {
-  outcomes_.push_back({LogOdds(std::clamp(predicted, kSurest, 1.0 - kSurest)), added});
+void AttemptOdds::Note(double predicted, bool detected) {
+  outcomes_.push_back({LogOdds(std::clamp(predicted, kSurest, 1.0 - kSurest)), detected});
   for (int iteration = 0; iteration < 20; ++iteration) {  // Newton's method; the posterior has one maximum.
     double gradient = (first_guess_ - shift_) / (kShiftSigma * kShiftSigma), curvature = 1.0 / (kShiftSigma * kShiftSigma);
     for (const Outcome& outcome : outcomes_) {
       const double p = Logistic(outcome.log_odds + shift_);
-      gradient += (outcome.added ? 1.0 : 0.0) - p;
+      gradient += (outcome.detected ? 1.0 : 0.0) - p;
       curvature += p * (1.0 - p);
     }
     shift_ += std::clamp(gradient / curvature, -1.0, 1.0);
@@ -62,10 +65,8 @@ double AttemptOdds::Probability(double predicted) const {
 }
 
 void FailureMemory::Note(const Attempt& attempt) {
-  if (!attempt.view_added) {
-    failures_.push_back(attempt.viewpoint);
-    return;
-  }
+  if (!attempt.detected) failures_.push_back(attempt.viewpoint);
+  if (!attempt.view_added) return;
   const auto outdated = [&](const measures::Viewpoint& failure) {
     return geometry::AngleBetween(failure.direction, attempt.viewpoint.direction) < kMatters_rad;
   };

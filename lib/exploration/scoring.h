@@ -11,12 +11,13 @@ namespace vantage::exploration {
 // gain one per query.
 class GainScorer {
  public:
-  // Refers to the belief, which must outlive it.
-  GainScorer(const Belief& belief, measures::CompletenessRule rule);
+  // Refers to the belief, which must outlive it. `well_known`: from where the object was found to be known already; they count as
+  // views where gains are asked for, as nothing can be learned there, but not for completeness.
+  GainScorer(const Belief& belief, measures::CompletenessRule rule, const std::vector<measures::Viewpoint>& well_known = {});
 
   double completeness() const { return completeness_; }  // Equation (13).
 
-  // Equation (14): Completeness(views + view) - Completeness(views); >= 0.
+  // Equation (14): Completeness(views + view) - Completeness(views), well_known among the views; >= 0.
   double Gain(const measures::Viewpoint& view) const;
 
  private:
@@ -34,26 +35,26 @@ class GainScorer {
   double completeness_ = 0.0;
 };
 
-// How often attempts really add a view where (12) says p: its log odds plus a shift that is the same everywhere, the maximum a
-// posteriori of a logistic model with a Gaussian prior about the first guess.
+// How often attempts really detect the object where (12) says p: its log odds plus a shift that is the same everywhere, the maximum
+// a posteriori of a logistic model with a Gaussian prior about the first guess.
 class AttemptOdds {
  public:
   explicit AttemptOdds(double first_guess) : first_guess_(first_guess), shift_(first_guess) {}
 
-  void Note(double predicted, bool added);
+  void Note(double predicted, bool detected);
   double Probability(double predicted) const;  // 0 stays 0, and 1 stays 1.
 
  private:
   struct Outcome {
     double log_odds;
-    bool added;
+    bool detected;
   };
   double first_guess_, shift_;
   std::vector<Outcome> outcomes_;
 };
 
-// Attempts that added no view lower the belief in views near by until one is added from less than kMatters_rad away: from further
-// off the new view says nothing about the place.
+// Attempts that did not detect the object lower the belief in views near by until one is added from less than kMatters_rad away:
+// from further off the new view says nothing about the place.
 class FailureMemory {
  public:
   FailureMemory(double radius_rad, double discount) : radius_rad_(radius_rad), discount_(discount) {}

@@ -15,7 +15,7 @@ SharedStrategy::SharedStrategy(const PlannerParams& params, std::uint32_t seed)
 
 Decision SharedStrategy::Decide(const Belief& belief, const std::vector<CandidateView>& candidates, const motion::Stance& stance,
                                 const motion::Mount& mount, double elapsed_s) {
-  const GainScorer scorer(belief, params_.rule);
+  const GainScorer scorer(belief, params_.rule, well_known_);
   Decision decision;
   decision.completeness = scorer.completeness();
   decision.stop = StopWhateverThereIs(decision.completeness, elapsed_s);
@@ -53,12 +53,13 @@ void SharedStrategy::Report(const Attempt& attempt) {
     throw std::invalid_argument("an attempt's t_plan_s and t_learn_s must be >= 0 and finite");
   }
   attempted_.push_back(attempt.viewpoint);
+  if (attempt.detected && !attempt.view_added) well_known_.push_back(attempt.viewpoint);
   failures_.Note(attempt);
   t_plan_s_.Add(attempt.t_plan_s);
   if (attempt.looked) t_learn_s_.Add(attempt.t_learn_s);
   if (!last_chosen_id_) return;
   tried_ids_.insert(*last_chosen_id_);
-  if (attempt.looked) odds_.Note(last_predicted_, attempt.view_added);
+  if (attempt.looked) odds_.Note(last_predicted_, attempt.detected);
 }
 
 void SharedStrategy::PlanPaths(const std::vector<Candidate*>& candidates, const motion::Stance& stance,

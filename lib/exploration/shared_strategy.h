@@ -36,6 +36,8 @@ class SharedStrategy : public Strategy {
 
   double FailureFactor(const measures::Viewpoint& view) const { return failures_.Factor(view); }
   const std::vector<measures::Viewpoint>& attempted() const { return attempted_; }  // All that were reported.
+  // Where the object was detected, but the learner took no view: it is known from there, or there is nothing to learn.
+  const std::vector<measures::Viewpoint>& well_known() const { return well_known_; }
 
   // Another one after every attempt; the same decision asked for twice is the same decision.
   std::uint32_t DecisionSeed() const { return seed_ + 0x9E3779B9u * static_cast<std::uint32_t>(attempted_.size()); }
@@ -50,7 +52,7 @@ class SharedStrategy : public Strategy {
   FailureMemory failures_;
   AttemptOdds odds_;
   RunningMean t_plan_s_, t_learn_s_;
-  std::vector<measures::Viewpoint> attempted_;
+  std::vector<measures::Viewpoint> attempted_, well_known_;
   std::optional<int> last_chosen_id_;
   double last_predicted_ = 0.0;  // (12) at the view chosen last.
   std::set<int> tried_ids_;

@@ -50,10 +50,12 @@ class UtilityStrategy : public SharedStrategy {
 
  private:
   bool IsTooNear(const measures::Viewpoint& place, const Belief& belief) const {
-    return std::any_of(belief.views.begin(), belief.views.end(), [&](const measures::Viewpoint& view) {
+    const auto is_near = [&](const measures::Viewpoint& view) {
       return geometry::AngleBetween(view.direction, place.direction) < params_.min_view_angle_rad &&
              std::abs(std::log2(view.distance_m / place.distance_m)) < kSameDistance_octaves;
-    });
+    };
+    return std::any_of(belief.views.begin(), belief.views.end(), is_near) ||
+           std::any_of(well_known().begin(), well_known().end(), is_near);
   }
 
   // Without any place to see the object from, no view gains anything: the mount's words are the better reason.

@@ -87,7 +87,7 @@ class Run {
     Log(chosen, learned);
     exploration::Attempt attempt;
     attempt.viewpoint = chosen.view.viewpoint;
-    attempt.detected = learned.state == learning::State::kTracking;
+    attempt.detected = result_.log.back().detected;
     attempt.view_added = learned.view_added;
     attempt.t_plan_s = params_.planner.t_plan_s;
     attempt.t_learn_s = params_.planner.t_learn_s;
@@ -116,7 +116,7 @@ class Run {
           std::min(entry.nearest_view_rad, geometry::AngleBetween(view.direction, chosen.view.viewpoint.direction));
     }
     entry.move_s = chosen.t_move_s;
-    entry.detected = learned.state == learning::State::kTracking;
+    entry.detected = learned.state == learning::State::kTracking && learned.probability >= params_.learner.min_track_probability;
     entry.view_added = learned.view_added;
     entry.note = learned.note;
     result_.log.push_back(entry);

@@ -121,6 +121,7 @@ TEST(Params, TheHandEyeFileIsFoundBesideAndRefusedInOneClearLine) {
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("hand.yaml"), std::string::npos) << error.what();
   }
+}
 
 TEST(Params, TheShippedComparisonsAreThere) {
   const auto folder = std::filesystem::path(VANTAGE_SOURCE_DIR) / "config";

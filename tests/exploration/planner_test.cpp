@@ -135,8 +135,7 @@ TEST(Planner, AFailureChangesTheChoiceUntilAViewIsAdded) {
   const Decision before = decide();
   Attempt attempt;
   attempt.viewpoint = Chosen(before).view.viewpoint;
-  attempt.detected = true;  // Seen, but no view came of it: as bad.
-  attempt.looked = false;   // Of how often attempts detect it shall say nothing here.
+  attempt.looked = false;  // Of how often attempts detect it shall say nothing here.
   attempt.t_plan_s = 0.5;
   attempt.t_learn_s = 1.0;
   strategy->Report(attempt);
@@ -153,6 +152,21 @@ TEST(Planner, AFailureChangesTheChoiceUntilAViewIsAdded) {
   attempt.viewpoint = {Direction(0.0), 0.6};
   strategy->Report(attempt);
   EXPECT_NEAR(decide().candidates[index].detect_probability, before.candidates[index].detect_probability, 1e-12);
+}
+
+TEST(Planner, NothingIsToBeGainedWhereItIsWellKnown) {
+  const auto ring = Ring(5.0);
+  const Belief belief = BeliefFrom({ring[0]}, ring);
+  const auto strategy = MakeStrategy("planner", {}, 0);
+  const auto decide = [&] { return strategy->Decide(belief, ring, ring[0].T_world_camera, TestMount(), 0.0); };
+  const Decision before = decide();
+  const measures::Viewpoint place = Chosen(before).view.viewpoint;
+  strategy->Report({place, true, false, 0.5, 1.0});  // Seen, but no view came of it.
+  const Decision after = decide();
+  EXPECT_EQ(after.completeness, before.completeness) << "it is no view";
+  EXPECT_LT(after.candidates[static_cast<std::size_t>(before.chosen)].gain, 1e-9 + 0.3 * Chosen(before).gain);
+  EXPECT_EQ(after.candidates[static_cast<std::size_t>(before.chosen)].refusal, "too near to a learned view");
+  EXPECT_GT(geometry::AngleBetween(Chosen(after).view.viewpoint.direction, place.direction), 0.24);
 }
 
 TEST(Planner, LearnsWhatThingsReallyTake) {
