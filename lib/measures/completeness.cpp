@@ -63,7 +63,7 @@ double FitCommonCause(const std::vector<JointSample>& samples) {
   std::array<double, kSteps + 1> log_posterior{};
   for (int i = 0; i <= kSteps; ++i) {
     const double share = static_cast<double>(i) / kSteps;
-    const double prior = std::pow(share * (1.0 - share), 2);  // Beta(3, 3), not normalised.
+    const double prior = std::pow(share, 6) * std::pow(1.0 - share, 2);  // Beta(7, 3), not normalised.
     double& sum = log_posterior[static_cast<std::size_t>(i)] = std::log(std::max(prior, 1e-12));
     for (const JointSample& sample : samples) {
       const double p = std::clamp(sample.predicted.Value(CompletenessRule::kCommonCause, share), kSurest, 1.0 - kSurest);

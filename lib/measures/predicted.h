@@ -25,7 +25,7 @@ class PredictedSuccess {
   static constexpr int kScaleCells = 5;      // Half an octave each, centred at -1 .. +1.
   static constexpr double kRotationStepRad = 0.08726646259971647;
   static constexpr double kScaleStep = 0.5;
-  static constexpr double kDefaultCommonCause = 0.5;
+  static constexpr double kDefaultCommonCause = 0.7;
 
   PredictedSuccess();  // The shipped default (no trials).
   static PredictedSuccess Fit(const std::vector<PredictionSample>& samples, Source source, double prior_count = 4.0);

@@ -30,17 +30,17 @@ class Photographs {
  public:
   Photographs(const CompletenessOptions& options, const params::LibraryParams& params)
       : recogniser_(params.recogniser), scene_(options.folder), known_(scene_, options.object_id) {
-    truth_.points_in_mesh = known_.Surface(known_.ids());
+    for (const int id : rgbd::SelectFrames(known_.ids(), options.frames)) ids_.push_back(id);
+    truth_.points_in_mesh = known_.Surface(ids_);
     truth_.correct_m = params.trials.correct_m;
     truth_.T_mesh_object.translation() = truth_.points_in_mesh.rowwise().mean();
-    all_ = known_.Learn(known_.ids(), params.recogniser.features, truth_.T_mesh_object);
-    for (const int id : known_.ids()) frames_.push_back(HoldOut(known_.Load(id), known_.TruePose(id), truth_));
+    all_ = known_.Learn(ids_, params.recogniser.features, truth_.T_mesh_object);
+    for (const int id : ids_) frames_.push_back(HoldOut(known_.Load(id), known_.TruePose(id), truth_));
     FindFeatures(params.recogniser, &frames_);
     alone_ = assessment::TryViewsAlone(all_, truth_, frames_, params.recogniser);
-    const auto& ids = known_.ids();
     for (const model::View& view : all_.views) {
-      const auto frame = std::lower_bound(ids.begin(), ids.end(), static_cast<int>(view.frame_id));
-      frame_of_view_.push_back(static_cast<int>(frame - ids.begin()));
+      const auto frame = std::lower_bound(ids_.begin(), ids_.end(), static_cast<int>(view.frame_id));
+      frame_of_view_.push_back(static_cast<int>(frame - ids_.begin()));
     }
   }
 
@@ -92,6 +92,7 @@ class Photographs {
   rgbd::BopScene scene_;
   RecordedObject known_;
   assessment::Truth truth_;
+  std::vector<int> ids_;
   model::ObjectModel all_;
   std::vector<assessment::HeldOutFrame> frames_;
   std::vector<assessment::ViewTrial> alone_;
@@ -158,6 +159,15 @@ std::vector<CompletenessFigures> TryCompleteness(const CompletenessOptions& opti
     if (progress) progress(split + 1, options.splits);
   }
   return figures;
+}
+
+double PooledCommonCause(const std::vector<CompletenessFigures>& figures) {
+  std::vector<measures::JointSample> looks;
+  for (const CompletenessFigures& of : figures) {
+    if (of.views < 2) continue;
+    for (const auto& split : of.looks) looks.insert(looks.end(), split.begin(), split.end());
+  }
+  return measures::FitCommonCause(looks);
 }
 
 Json ToJson(const std::vector<CompletenessFigures>& figures) {

@@ -15,6 +15,7 @@ namespace vantage::cli {
 struct CompletenessOptions {
   std::string folder;  // A recording with depth, labels and truth.
   int object_id = 0;
+  std::string frames = "all";  // As rgbd::SelectFrames.
   std::vector<int> views = {1, 2, 4, 8, 16};
   int splits = 30;  // Of the frames, at random: a third is learned from, one measures are fitted on, one judges.
   std::uint32_t seed = 0;
@@ -35,6 +36,9 @@ struct CompletenessFigures {
 // Throws std::runtime_error where the recording lacks what is needed. `progress` after every split.
 std::vector<CompletenessFigures> TryCompleteness(const CompletenessOptions& options, const params::LibraryParams& params,
                                                  const std::function<void(int done, int of)>& progress = {});
+
+// The share of failures that come to all views at once which explains all looks of several views best, whatever the model.
+double PooledCommonCause(const std::vector<CompletenessFigures>& figures);
 
 Json ToJson(const std::vector<CompletenessFigures>& figures);
 std::string TableOf(const std::vector<CompletenessFigures>& figures);

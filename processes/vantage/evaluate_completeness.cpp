@@ -1,5 +1,6 @@
 // vantage evaluate completeness: how the views' probabilities combine, measured on photographs.
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <iostream>
 
 #include "vantage/completeness_trial.h"
@@ -22,7 +23,12 @@ void RunEvaluateCompleteness(const Options& options) {
   const auto figures = TryCompleteness(trial, params, [](int done, int of) {
     std::cerr << "\r" << done << " of " << of << " splits" << (done == of ? "\n" : "") << std::flush;
   });
-  WriteResult(options.common, {{"splits", trial.splits}, {"seed", trial.seed}, {"views", ToJson(figures)}}, TableOf(figures));
+  const double pooled = PooledCommonCause(figures);
+  char line[100];
+  std::snprintf(line, sizeof line, "common cause of all looks of several views together: %.2f\n", pooled);
+  WriteResult(options.common,
+              {{"splits", trial.splits}, {"seed", trial.seed}, {"views", ToJson(figures)}, {"common_cause_pooled", pooled}},
+              TableOf(figures) + line);
 }
 
 }  // namespace
@@ -39,6 +45,8 @@ void AddEvaluateCompleteness(CLI::App& evaluate, Run& run) {
       ->required()
       ->check(CLI::Range(1, 1000000))
       ->type_name("N");
+  verb->add_option("--frames", options->trial.frames, "Of these frames: all, even, odd (by id), or ids A:B without B")
+      ->capture_default_str();
   verb->add_option("--views", options->trial.views, "Views of the models")
       ->delimiter(',')
       ->check(CLI::Range(1, 1000))
