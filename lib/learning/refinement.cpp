@@ -1,6 +1,5 @@
 #include "learning/refinement.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,7 +11,6 @@
 
 #include "learning/keyframe.h"
 #include "learning/model_edit.h"
-#include "pose/normal_equations.h"
 
 namespace vantage::learning {
 namespace {
@@ -95,12 +93,6 @@ pose::Appearance AppearanceInCamera(model::View view, const RefinementParams& pa
   return appearance;
 }
 
-Eigen::Vector3d CentreOf(const std::vector<pose::SurfacePoint>& surface) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const pose::SurfacePoint& sample : surface) sum += sample.point;
-  return sum / std::max<double>(1.0, static_cast<double>(surface.size()));
-}
-
 // How far apart two poses put what a view shows, in the mean.
 double MeanMove(const pose::Appearance& appearance, const geometry::Rigid& T_a, const geometry::Rigid& T_b) {
   double sum = 0.0;
@@ -160,25 +152,12 @@ Pairs PairsToRelate(const model::ObjectModel& object, int first_free_view, const
 }
 
 // How far from where the surface alone wants it a fit of surface and texture is: squared, in standard deviations of the former.
-// Ways in which the surface slides along itself (a can about its axis) do not count: what little it says of them is its noise.
-double Contradiction(const pose::DenseFit& both, const pose::DenseFit& surface, const Eigen::Vector3d& centre_in_camera) {
-  constexpr double kSize_m = 0.05;          // A turn of one radian moves the surface so far.
-  constexpr double kLeastStiffness = 0.02;  // Of the stiffest way's.
+double Contradiction(const pose::DenseFit& both, const pose::DenseFit& surface) {
   const geometry::Rigid moved = both.T_camera_object * surface.T_camera_object.inverse();
   const Eigen::AngleAxisd turn(moved.linear());
-  Eigen::Matrix<double, 6, 1> step;  // Of the centre, and about it.
-  step << moved * centre_in_camera - centre_in_camera, kSize_m * turn.angle() * turn.axis();
-  pose::Matrix6d of_camera = pose::Matrix6d::Identity();  // From steps of the centre to those of the information.
-  of_camera.topRightCorner<3, 3>() = pose::Cross(centre_in_camera) / kSize_m;
-  of_camera.bottomRightCorner<3, 3>() /= kSize_m;
-  const Eigen::SelfAdjointEigenSolver<pose::Matrix6d> ways(of_camera.transpose() * surface.information * of_camera);
-  double sum = 0.0;
-  for (int i = 0; i < 6; ++i) {
-    const double stiffness = ways.eigenvalues()[i];
-    if (stiffness < kLeastStiffness * ways.eigenvalues()[5]) continue;
-    sum += stiffness * std::pow(ways.eigenvectors().col(i).dot(step), 2);
-  }
-  return sum;
+  Eigen::Matrix<double, 6, 1> step;
+  step << moved.translation(), turn.angle() * turn.axis();
+  return step.dot(surface.information * step);
 }
 
 // What one view looks like fitted to the images of another; nullopt where nothing says that they show the same. The surface alone
@@ -195,8 +174,7 @@ std::optional<pose::DenseFit> FitOfPair(const pose::Appearance& appearance, cons
   if (!alike && !is_linked) return std::nullopt;
   if (!params.use_depth || (alike && shared >= kPrint)) return both;
   const pose::DenseFit surface = pose::FitDensely({appearance.surface, {}}, frame, nullptr, T_b_a, params.dense);
-  const double contradiction = Contradiction(both, surface, surface.T_camera_object * CentreOf(appearance.surface));
-  return alike && contradiction <= kMaxContradiction ? both : surface;
+  return alike && Contradiction(both, surface) <= kMaxContradiction ? both : surface;
 }
 
 // Depth and colour images of pairs of views fitted to each other, from where the problem has them.
