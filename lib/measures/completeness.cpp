@@ -58,7 +58,7 @@ JointProbability Joint(const std::vector<Viewpoint>& views, const Viewpoint& que
 }
 
 double FitCommonCause(const std::vector<JointSample>& samples) {
-  constexpr int kSteps = 50;
+  constexpr int kSteps = 400;
   constexpr double kSurest = 0.002;  // Single outcomes never rule a share out.
   std::array<double, kSteps + 1> log_posterior{};
   for (int i = 0; i <= kSteps; ++i) {
