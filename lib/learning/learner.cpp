@@ -64,7 +64,8 @@ struct Learner::Impl {
   int confirmations = 0;  // Frames that agreed since the object was found again.
   int reference_view = -1;
   Motion motion;
-  std::optional<geometry::Rigid> seen_last;  // Its pose in the last frame it was found in.
+  bool followed_last = false;                // Where the last frames led, when it was found last: frames hang together.
+  std::optional<geometry::Rigid> seen_last;  // Where it was followed to; none where it was only found.
   int lost_frames = 0;                       // Searched by the whole model since.
   MountWitness mount;
   std::optional<segmentation::Plane> plane;
@@ -237,7 +238,7 @@ struct Learner::Impl {
   // image.
   std::optional<Track> Relocalise(const rgbd::Frame& frame) {
     if (motion.last()) {  // It was found in the last frame.
-      seen_last = motion.last();
+      seen_last = followed_last ? motion.last() : std::nullopt;
       lost_frames = 0;
     }
     const bool near = seen_last && ++lost_frames % kWholeImageEvery != 0;
@@ -381,6 +382,7 @@ struct Learner::Impl {
       return Lose(result, "the track contradicts the mount's pose");
     }
     if (!known_pose && track.probability < kSeen) return Lose(result, "the object was not found");
+    followed_last = found->followed;
     state = result.state = known_pose ? State::kTracking : StateOf(frame, *found);
     return Advance(frame, *found, result, known_pose.has_value());
   }
