@@ -17,7 +17,7 @@ namespace vantage::learning {
 namespace {
 
 constexpr double kSeen = 0.5;        // p(o|c) from which a pose counts as the object's.
-constexpr int kWholeImageEvery = 3;  // Frames.
+constexpr int kWholeImageEvery = 3;  // Of the frames a lost object is sought in; in the others only about where it was followed to.
 
 // Where depth must not help to place the object in a frame it must not help to refine views either.
 LearnerParams WithoutDepthWhereNotWanted(LearnerParams params) {
@@ -64,9 +64,8 @@ struct Learner::Impl {
   int confirmations = 0;  // Frames that agreed since the object was found again.
   int reference_view = -1;
   Motion motion;
-  bool followed_last = false;                // Where the last frames led, when it was found last: frames hang together.
-  std::optional<geometry::Rigid> seen_last;  // Where it was followed to; none where it was only found.
-  int lost_frames = 0;                       // Searched by the whole model since.
+  std::optional<geometry::Rigid> followed_to;  // Where it was found last; none where frames did not lead there.
+  int frames_sought = 0;                       // By the whole model, since.
   MountWitness mount;
   std::optional<segmentation::Plane> plane;
   std::vector<segmentation::Cluster> clusters;
@@ -234,16 +233,12 @@ struct Learner::Impl {
     return held && IsGood(frame, found.track) ? std::optional<Found>(found) : std::nullopt;
   }
 
-  // By the whole model: about where it was seen last, which is quick; every few frames, and where it never was, anywhere in the
-  // image.
+  // By the whole model: about where it was followed to, which is quick; every few frames, and where frames did not lead to it,
+  // anywhere in the image.
   std::optional<Track> Relocalise(const rgbd::Frame& frame) {
-    if (motion.last()) {  // It was found in the last frame.
-      seen_last = followed_last ? motion.last() : std::nullopt;
-      lost_frames = 0;
-    }
-    const bool near = seen_last && ++lost_frames % kWholeImageEvery != 0;
+    const bool near = followed_to && ++frames_sought % kWholeImageEvery != 0;
     const features::Features features =
-        near ? tracker.ExtractAround(*object, frame, {*seen_last, 0.5 * Size_px(frame, *seen_last), false})
+        near ? tracker.ExtractAround(*object, frame, {*followed_to, 0.5 * Size_px(frame, *followed_to), false})
              : CurrentRecogniser().Extract(frame);
     const auto detections = CurrentRecogniser().Recognise(frame, features);
     if (detections.empty()) return std::nullopt;
@@ -303,7 +298,11 @@ struct Learner::Impl {
       moved[new_index[p]].seen += statistics[p].seen;
     }
     statistics = std::move(moved);
-    if (reference_id >= 0) motion.ChangeObject(ChangeOf(*object, rebased, reference_id).inverse());
+    if (reference_id >= 0) {
+      const geometry::Rigid change = ChangeOf(*object, rebased, reference_id).inverse();
+      motion.ChangeObject(change);
+      if (followed_to) followed_to = *followed_to * change;
+    }
     Adopt(std::move(rebased));
     reference_view = IndexOfView(*object, reference_id);
     if (reference_view < 0 && motion.last()) reference_view = model::NearestViews(*object, *motion.last(), 1).front();
@@ -382,7 +381,8 @@ struct Learner::Impl {
       return Lose(result, "the track contradicts the mount's pose");
     }
     if (!known_pose && track.probability < kSeen) return Lose(result, "the object was not found");
-    followed_last = found->followed;
+    followed_to = found->followed ? std::optional(track.T_camera_object) : std::nullopt;
+    frames_sought = 0;
     state = result.state = known_pose ? State::kTracking : StateOf(frame, *found);
     return Advance(frame, *found, result, known_pose.has_value());
   }

@@ -382,6 +382,7 @@ TEST_F(OpenNiDevice, TheSensorNeverGivesUpOnASilentCamera) {
 }
 
 TEST_F(OpenNiDevice, TheSensorProgramRecordsUntilItIsEnded) {
+  constexpr std::uintmax_t kBytes = 3000000;  // Some twenty frames.
   const std::string file = (Camera().folder() / "program.oni").string();
   std::fflush(nullptr);
   const pid_t sensor = fork();
@@ -392,16 +393,25 @@ TEST_F(OpenNiDevice, TheSensorProgramRecordsUntilItIsEnded) {
             nullptr);
     _exit(127);
   }
-  // A busy machine takes seconds to start it: what counts is that frames come to the disk, not how soon.
+  // A busy machine takes seconds to start it, and has its own pace: what counts is that frames come to the disk, not how soon.
   const auto patience = std::chrono::steady_clock::now() + Seconds(30.0);
   std::error_code none;
   const auto bytes = [&] { return std::filesystem::exists(file, none) ? std::filesystem::file_size(file, none) : 0; };
-  while (bytes() < 1000000 && std::chrono::steady_clock::now() < patience) {
+  while (bytes() < kBytes && std::chrono::steady_clock::now() < patience) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   ::kill(sensor, SIGTERM);
   int status = 0;
-  ASSERT_EQ(waitpid(sensor, &status, 0), sensor);
+  pid_t ended = 0;
+  const auto end = std::chrono::steady_clock::now() + Seconds(30.0);
+  while ((ended = waitpid(sensor, &status, WNOHANG)) == 0 && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  if (ended == 0) {
+    ::kill(sensor, SIGKILL);
+    waitpid(sensor, &status, 0);
+  }
+  ASSERT_EQ(ended, sensor) << "it does not end";
   ASSERT_EQ(status, 0);
   InChild([&] {
     OpenNiParams play;
@@ -409,7 +419,7 @@ TEST_F(OpenNiDevice, TheSensorProgramRecordsUntilItIsEnded) {
     OpenNiSource source(play);
     int played = 0;
     while (const auto frame = source.Next()) played += frame->color.size() == cv::Size(320, 240);
-    EXPECT_GT(played, 5);
+    EXPECT_GT(played, 15);
   });
 }
 

@@ -140,7 +140,7 @@ TEST(Impossible, ObjectTakenAwayWhileExploring) {
   const Ended ended = ExploreIt(world, Quick());
   EXPECT_EQ(ended.result.stop_reason, "nothing_worth_its_cost");
   EXPECT_LE(ended.result.views, 2);
-  EXPECT_LT(ended.result.attempts, 40);  // Of 60 it may make.
+  EXPECT_LT(ended.result.attempts, 20);  // Of 60 it may make.
 }
 
 }  // namespace

@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <deque>
 #include <filesystem>
 #include <opencv2/imgproc.hpp>
@@ -15,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "rgbd/openni/openni_library.h"
 #include "rgbd/openni/video_mode.h"
 
 namespace vantage::rgbd {
@@ -25,49 +24,6 @@ constexpr std::size_t kLongestQueue = 30;  // Frames of one stream that wait for
 constexpr std::chrono::milliseconds kSettle{30};
 
 constexpr int kLookEvery_ms = 100;  // A device that is unplugged is noticed so soon.
-
-// OpenNI's last complaint on one line.
-std::string Complaint() {
-  std::string text = openni::OpenNI::getExtendedError();
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\t' || c == '\r'; }, ' ');
-  const std::size_t first = text.find_first_not_of(' '), last = text.find_last_not_of(' ');
-  return first == std::string::npos ? "no reason given" : text.substr(first, last - first + 1);
-}
-
-[[noreturn]] void Fail(const std::string& uri, const std::string& what) {
-  throw std::runtime_error((uri.empty() ? std::string("OpenNI2 device") : uri) + ": " + what);
-}
-
-// OpenNI counts its initialisations; one per source keeps the pairs in step.
-class Library {
- public:
-  Library() {
-    if (openni::OpenNI::initialize() != openni::STATUS_OK)
-      throw std::runtime_error("OpenNI2: expected to start, found: " + Complaint() + "; is libopenni2-0 installed whole?");
-  }
-  ~Library() { openni::OpenNI::shutdown(); }
-  Library(const Library&) = delete;
-  Library& operator=(const Library&) = delete;
-};
-
-// Hears when a device is unplugged, from a thread of OpenNI's.
-class GoneListener : public openni::OpenNI::DeviceDisconnectedListener {
- public:
-  explicit GoneListener(std::string uri) : uri_(std::move(uri)) { openni::OpenNI::addDeviceDisconnectedListener(this); }
-  ~GoneListener() { openni::OpenNI::removeDeviceDisconnectedListener(this); }
-  void onDeviceDisconnected(const openni::DeviceInfo* device) override {
-    if (uri_ == device->getUri()) gone_ = true;
-  }
-  bool gone() const { return gone_; }
-
- private:
-  std::string uri_;
-  std::atomic<bool> gone_{false};
-};
-
-// "1d27/0609@3/12" -> "1d27/0609": what it is, without where it is plugged in.
-std::string Kind(const std::string& uri) { return uri.substr(0, uri.find('@')); }
 
 struct TimedImage {
   std::int64_t time_us = 0;  // The stream's own clock, repeats laid end to end.
@@ -122,11 +78,12 @@ class OpenNiSource::Implementation {
   }
 
   ~Implementation() {
+    Stop();
+    // Only now: a recorder that goes while its streams run locks them and itself in the other order than a frame that comes does.
     if (recorder_.isValid()) {
       recorder_.stop();
       recorder_.destroy();
     }
-    Stop();
     // The file driver's thread walks its list of streams without a lock; with all of them stopped it only looks every 10 ms.
     // Streams that go while it spins at the end of a file crash it.
     if (device_.isFile()) std::this_thread::sleep_for(kSettle);
@@ -172,35 +129,13 @@ class OpenNiSource::Implementation {
     if (is_file && !std::filesystem::is_regular_file(uri_))
       Fail(uri_, "expected an .oni recording, found no such file; check the path");
     std::string listed;
-    if (!is_file) uri_ = FindDevice(listed);
+    if (!is_file) uri_ = FindDevice(params_.uri, params_.elsewhere, listed);
     gone_.emplace(uri_);
     if (device_.open(uri_.c_str()) == openni::STATUS_OK) return SetUpPlayback();
     if (is_file) Fail(uri_, "expected an .oni recording, found: " + Complaint() + "; is it whole, and made by OpenNI2?");
-    if ((", " + listed + ", ").find(", " + uri_ + ", ") == std::string::npos) FailMissing(listed);
+    if ((", " + listed + ", ").find(", " + uri_ + ", ") == std::string::npos) FailMissing(uri_, listed);
     Fail(uri_, "the device is there, but cannot be opened: " + Complaint() +
                    "; may this user open it (scripts/doctor says how), is another program using it?");
-  }
-
-  // The URI of the device that is meant; `listed`: of all that OpenNI knows (it may open others).
-  std::string FindDevice(std::string& listed) const {
-    openni::Array<openni::DeviceInfo> devices;
-    openni::OpenNI::enumerateDevices(&devices);
-    std::string of_the_kind;
-    bool there = false;
-    for (int i = 0; i < devices.getSize(); ++i) {
-      const std::string uri = devices[i].getUri();
-      there = there || uri == uri_;
-      if ((uri_.empty() || (params_.elsewhere && Kind(uri) == Kind(uri_))) && of_the_kind.empty()) of_the_kind = uri;
-      listed += (listed.empty() ? "" : ", ") + uri;
-    }
-    if (!there && !of_the_kind.empty()) return of_the_kind;
-    if (uri_.empty()) FailMissing(listed);
-    return uri_;
-  }
-
-  [[noreturn]] void FailMissing(const std::string& listed) const {
-    Fail(uri_, "expected a device, found " + (listed.empty() ? "none" : listed) +
-                   "; is it plugged in, with a driver (scripts/doctor looks for both)? Or name an .oni file");
   }
 
   // A recording left running at its end would keep a core busy.
