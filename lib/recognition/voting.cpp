@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 namespace vantage::recognition {
 
@@ -17,8 +19,12 @@ std::vector<VoteCluster> MeanShift(const std::vector<Vote>& votes, double bandwi
   std::vector<double> reach_px2;  // Squared.
   for (const Vote& vote : votes) reach_px2.push_back(bandwidth * vote.radius_px * bandwidth * vote.radius_px);
   std::vector<Eigen::Vector2d> modes;
+  // Climbs that come to the very same place go on as one, and most do: the mean depends on which votes are in reach alone.
+  std::map<std::pair<double, double>, Eigen::Vector2d> top_from;
+  std::vector<std::pair<double, double>> passed;
   for (const Vote& start : votes) {
     Eigen::Vector2d mode = start.centre;
+    passed.clear();
     for (int step = 0; step < kMaxSteps; ++step) {
       Eigen::Vector2d sum = Eigen::Vector2d::Zero();
       double weight = 0.0;
@@ -33,7 +39,13 @@ std::vector<VoteCluster> MeanShift(const std::vector<Vote>& votes, double bandwi
       const bool still = (next - mode).norm() < 0.05;
       mode = next;
       if (still) break;
+      if (const auto known = top_from.find({mode.x(), mode.y()}); known != top_from.end()) {
+        mode = known->second;
+        break;
+      }
+      passed.emplace_back(mode.x(), mode.y());
     }
+    for (const auto& place : passed) top_from.emplace(place, mode);
     modes.push_back(mode);
   }
   std::vector<VoteCluster> clusters;

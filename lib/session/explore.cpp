@@ -215,14 +215,20 @@ class Run {
 
   // Now that a view was learned from there.
   double TrueRateSince(const Eigen::Vector3d& direction) {
-    outcomes_.resize(static_cast<std::size_t>(judge_->size()), 0);
-    std::vector<char> asked = judge_->Near(direction, T_mesh_object(), params_.judge_within_deg * M_PI / 180.0);
-    for (std::size_t i = 0; i < asked.size(); ++i) asked[i] = static_cast<char>(asked[i] != 0 || outcomes_[i] == 0);
+    const int wanted = params_.judge_views_over_time;
+    const auto views = static_cast<std::size_t>(wanted > 0 ? std::min(wanted, judge_->size()) : judge_->size());
+    outcomes_.resize(views, 0);
+    const auto near = [&](double degrees) { return judge_->Near(direction, T_mesh_object(), degrees * M_PI / 180.0); };
+    const std::vector<char> again = near(params_.judge_within_deg);
+    std::vector<char> asked = near(params_.judge_reach_deg);
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      asked[i] = static_cast<char>(i < views && (outcomes_[i] == 0 ? asked[i] : again[i]) != 0);
+    }
     const std::vector<char> now = judge_->Outcomes(learner_.object(), T_mesh_object(), asked);
-    for (std::size_t i = 0; i < now.size(); ++i) {
+    for (std::size_t i = 0; i < views; ++i) {
       if (asked[i] != 0) outcomes_[i] = now[i];
     }
-    return std::accumulate(outcomes_.begin(), outcomes_.end(), 0.0) / std::max(1, judge_->size());
+    return std::accumulate(outcomes_.begin(), outcomes_.end(), 0.0) / std::max(1.0, static_cast<double>(views));
   }
 
   void Finish() {
@@ -256,7 +262,7 @@ class Run {
   std::vector<assessment::Trial> trials_;
   std::vector<exploration::CandidateView> candidates_;
   std::vector<measures::WeightedViewpoint> reachable_;
-  std::vector<char> outcomes_;  // Of the judging views, when they were judged last.
+  std::vector<char> outcomes_;  // Of the judging views over time, when they were judged last.
   ExploreResult result_;
 };
 
@@ -275,6 +281,10 @@ void ExploreParams::Check() const {
   if (!(judge_within_deg > 0.0 && judge_within_deg <= 180.0)) {
     throw std::invalid_argument("explore: judge_within_deg must be in (0, 180]");
   }
+  if (!(judge_reach_deg >= judge_within_deg && judge_reach_deg <= 180.0)) {
+    throw std::invalid_argument("explore: judge_reach_deg must be in [judge_within_deg, 180]");
+  }
+  if (judge_views_over_time < 0) throw std::invalid_argument("explore: judge_views_over_time must be >= 0");
   if (max_backgrounds < 0) throw std::invalid_argument("explore: max_backgrounds must be >= 0");
 }
 

@@ -29,10 +29,13 @@ struct ExploreParams {
   // What the strategy "oracle" knows; null for the others. Must outlive the run.
   const exploration::OutcomeTable* outcomes = nullptr;
   int max_backgrounds = 8;  // Own frames, objects masked, that virtual views are pasted over; >= 0.
-  // Judge the model after every view, not only at the end: by the judging views it was not detected in so far, and again by those
-  // that see it from less than judge_within_deg of the new view, as little changes for the others. 180 = all.
+  // Judge the model after every view, not only, by all judging views, at the end: by the first judge_views_over_time of them, and
+  // of these only by such as see it from less than judge_within_deg of the new view, or where it was not detected so far from less
+  // than judge_reach_deg, as little changes for the others. 180 = all.
   bool judge_over_time = true;
+  int judge_views_over_time = 0;   // >= 0; 0 = all.
   double judge_within_deg = 30.0;  // (0, 180].
+  double judge_reach_deg = 75.0;   // [judge_within_deg, 180].
   std::uint32_t seed = 0;
 
   void Check() const;  // Throws std::invalid_argument naming the field.

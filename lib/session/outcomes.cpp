@@ -1,15 +1,19 @@
 #include "session/outcomes.h"
 
+#include <algorithm>
+
 #include "geometry/rigid.h"
 #include "learning/learner.h"
 
 namespace vantage::session {
 namespace {
 
+constexpr int kDirections = 120;  // Of the table, over the whole sphere: 18 degrees apart, which is what its cost allows.
 constexpr std::uint32_t kLearnSeed = 0x0ac1e, kLookSeed = 0x5ee;  // Pictures of their own.
 
 std::vector<geometry::Rigid> CandidatePoses(const simulation::World& world, const geometry::Rigid& T_world_object,
-                                            const exploration::CandidateParams& params) {
+                                            exploration::CandidateParams params) {
+  params.directions = std::min(params.directions, kDirections);
   std::vector<geometry::Rigid> poses = world.Viewpoints();
   if (!poses.empty()) return poses;
   for (const auto& candidate : exploration::SampleCandidates(T_world_object, params)) poses.push_back(candidate.T_world_camera);

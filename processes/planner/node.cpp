@@ -81,7 +81,7 @@ void PlannerNode::OnTrack(const track_t& message) {
   if (phase_ != Phase::kLooking) return;
   if (track->utime < look_.arrived_us + static_cast<std::int64_t>(params_.settle_s * 1e6)) return;
   ++look_.frames;
-  look_.detected |= track->result.T_camera_object.has_value() && track->result.probability >= 0.5;
+  look_.detected |= track->result.state == learning::State::kTracking && track->result.probability >= params_.min_track_probability;
   look_.view_coming |= track->result.view_added;
   look_.note = track->result.note;
 }

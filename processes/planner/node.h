@@ -35,6 +35,7 @@ struct PlannerNodeParams {
   double table_height_m = 0.75;   // Above the floor; > 0.
   std::string summary;            // A JSON file to write at the end; empty: none.
   bool exit_when_done = false;    // The process ends with the run.
+  double min_track_probability = 0.7;  // The learner's: an attempt that finds the object less surely did not detect it.
   exploration::PlannerParams planner;
   exploration::CandidateParams candidates;
   motion::MountParams mount;
@@ -42,7 +43,7 @@ struct PlannerNodeParams {
   void Check() const;  // Throws std::invalid_argument naming the field.
 };
 
-// `config_file`: the fields above but the last three, which are in `library_file`. Either may be empty. Throws std::runtime_error.
+// `config_file`: the fields above but the last four, which are in `library_file`. Either may be empty. Throws std::runtime_error.
 PlannerNodeParams LoadPlannerNodeParams(const std::string& config_file, const std::string& library_file);
 
 class PlannerNode : public messaging::Node {

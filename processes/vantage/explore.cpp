@@ -96,6 +96,10 @@ void AddExplore(CLI::App& app, Run& run) {
   verb->add_option("--judge-views", options->judge_views, "Fresh views that judge in a simulated world")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
+  verb->add_option("--judge-views-over-time", options->judge_views_over_time,
+                   "So many of them judge after every view, all at the end; 0 = all")
+      ->check(CLI::Range(0, 100000))
+      ->capture_default_str();
   verb->add_flag("--judge-over-time", options->judge_over_time, "Judge after every view in a simulated world too");
   verb->add_option("--store", options->store, "Keep the learned objects in this store")->type_name("FILE");
   verb->callback([options, &run] { run = [options] { RunExplore(*options); }; });

@@ -1,7 +1,9 @@
 // vantage explore --compare: every strategy in every world with every seed, each run kept on disk.
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <iostream>
+#include <optional>
 
 #include "session/outcomes.h"
 #include "vantage/explore_runs.h"
@@ -11,9 +13,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Made when the first run in it is wanted.
 struct World {
   std::string name;
-  Scenario scenario;
+  std::function<Scenario()> make;
+  std::optional<Scenario> scenario;
   exploration::OutcomeTable outcomes;
 };
 
@@ -26,7 +30,8 @@ void MakeQuick(params::LibraryParams& params) {
 
 // All that the result of a run depends on beside world, strategy and seed; two comparisons must not be mixed.
 std::string SettingsOf(const ExploreOptions& options, const params::LibraryParams& params) {
-  std::string text = "judge_views=" + std::to_string(options.judge_views) + (options.quick ? " quick" : "");
+  std::string text = "judge_views=" + std::to_string(options.judge_views) + "/" + std::to_string(options.judge_views_over_time) +
+                     (options.quick ? " quick" : "");
   for (const auto& [key, value] : params::Flatten(params)) text += " " + key + "=" + value;
   std::uint64_t hash = 1469598103934665603ull;  // FNV-1a.
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
@@ -71,8 +76,9 @@ exploration::OutcomeTable OutcomesOf(const World& world, const session::ExploreP
     table.Check();
     return table;
   }
-  table = session::MakeOutcomeTable(
-      *world.scenario.world, world.scenario.starts.front(), params, *world.scenario.judge, 1.05, [&](int done, int all) {
+  const Scenario& scenario = *world.scenario;
+  table =
+      session::MakeOutcomeTable(*scenario.world, scenario.starts.front(), params, *scenario.judge, 1.05, [&](int done, int all) {
         if (done % 10 == 0) std::cout << "outcomes of " << world.name << ": " << done << " of " << all << '\n' << std::flush;
       });
   Json json;
@@ -88,19 +94,23 @@ exploration::OutcomeTable OutcomesOf(const World& world, const session::ExploreP
   return table;
 }
 
+// `options` and `params` must outlive the worlds.
 std::vector<World> WorldsOf(const ExploreOptions& options, const params::LibraryParams& params) {
   std::vector<World> worlds;
+  const auto add = [&](const std::string& name, std::function<Scenario()> make) {
+    worlds.push_back({name, std::move(make), std::nullopt, {}});
+  };
   for (const std::string& mesh : options.meshes) {
     if (!options.sequence.empty()) break;  // Then it is the surface to judge by.
-    worlds.push_back({WorldName(mesh), SimulatedScenario("", {mesh}, "", options.judge_views, params, 0, true), {}});
+    add(WorldName(mesh), [&, mesh] { return SimulatedScenario("", {mesh}, "", options.judge_views, params, 0, true); });
   }
   if (!options.sequence.empty()) {
     const std::string mesh = options.meshes.empty() ? "" : options.meshes.front();
-    worlds.push_back({WorldName(options.sequence), RecordedScenario(options.sequence, options.object_id, mesh, params), {}});
+    add(WorldName(options.sequence), [&, mesh] { return RecordedScenario(options.sequence, options.object_id, mesh, params); });
   }
   if (!options.world.empty()) {
-    worlds.push_back(
-        {WorldName(options.world), SimulatedScenario(options.world, {}, options.object, options.judge_views, params, 0, true), {}});
+    add(WorldName(options.world),
+        [&] { return SimulatedScenario(options.world, {}, options.object, options.judge_views, params, 0, true); });
   }
   return worlds;
 }
@@ -134,7 +144,8 @@ void Compare(const ExploreOptions& given) {
           continue;
         }
         options.strategy = strategy;
-        session::ExploreParams explore = ParamsOf(options, params, world.scenario, seed);
+        if (!world.scenario) world.scenario = world.make();
+        session::ExploreParams explore = ParamsOf(options, params, *world.scenario, seed);
         explore.judge_over_time = true;
         if (strategy == "oracle") {
           if (world.outcomes.viewpoints.empty()) {
@@ -142,7 +153,7 @@ void Compare(const ExploreOptions& given) {
           }
           explore.outcomes = &world.outcomes;
         }
-        const session::ExploreResult result = RunOnce(world.scenario, explore, "", nullptr, {});
+        const session::ExploreResult result = RunOnce(*world.scenario, explore, "", nullptr, {});
         Json run = ToJson(result);
         run["world"] = world.name;
         run["settings"] = settings;

@@ -59,6 +59,7 @@ session::ExploreParams ParamsOf(const ExploreOptions& options, const params::Lib
   explore.trials = params.trials;
   explore.strategy = options.strategy;
   explore.judge_over_time = scenario.judge_over_time || options.judge_over_time;
+  explore.judge_views_over_time = options.judge_views_over_time;
   explore.seed = seed;
   return explore;
 }

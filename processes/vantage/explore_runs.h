@@ -21,6 +21,7 @@ struct ExploreOptions {
   std::string strategy = "planner";
   int runs = 1;
   int judge_views = 200;
+  int judge_views_over_time = 0;
   bool judge_over_time = false;
   std::string store;
   std::string compare;                  // Folder of a comparison; empty = none.

@@ -45,5 +45,40 @@ TEST(MeanShift, GathersTheVotesOfOneObjectAndRanksIt) {
   EXPECT_TRUE(MeanShift({}, 0.5).empty());
 }
 
+// Every vote climbs for itself: the mode it comes to, without any of what makes MeanShift quick.
+Eigen::Vector2d Climb(const std::vector<Vote>& votes, Eigen::Vector2d mode, double bandwidth) {
+  for (int step = 0; step < 100; ++step) {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    double weight = 0.0;
+    for (const Vote& vote : votes) {
+      if ((vote.centre - mode).norm() > bandwidth * vote.radius_px) continue;
+      sum += vote.weight * vote.centre;
+      weight += vote.weight;
+    }
+    const Eigen::Vector2d next = sum / weight;
+    if ((next - mode).norm() < 1e-9) break;
+    mode = next;
+  }
+  return mode;
+}
+
+TEST(MeanShift, EveryVoteIsInTheClusterOfTheModeItClimbsTo) {
+  std::mt19937 random(3);
+  const auto uniform = [&](double low, double high) { return low + (high - low) * (random() / 4294967296.0); };
+  std::vector<Vote> votes;
+  for (const double x : {200.0, 420.0, 700.0}) {
+    for (int i = 0; i < 50; ++i) {
+      const double radius_px = uniform(40, 70);
+      votes.push_back({{x + uniform(-30, 30), 300 + uniform(-30, 30)}, radius_px, uniform(0.5, 1.5)});
+    }
+  }
+  for (const VoteCluster& cluster : MeanShift(votes, 0.5)) {
+    for (const int vote : cluster.votes) {
+      const Vote& member = votes[static_cast<std::size_t>(vote)];
+      EXPECT_LT((Climb(votes, member.centre, 0.5) - cluster.centre).norm(), 0.25 * member.radius_px + 0.5) << vote;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace vantage::recognition

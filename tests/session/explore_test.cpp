@@ -70,6 +70,25 @@ TEST_F(Table, LearnsViewsKeepsThemAndEndsByItself) {
   EXPECT_EQ(stored->measures.observed.source(), measures::Source::kOwn);
 }
 
+TEST_F(Table, JudgesOnTheWayByTheFirstViewsAndAtTheEndByAll) {
+  ExploreParams params = QuickParams();
+  params.planner.max_attempts = 1;
+  params.judge_views_over_time = 1;
+  const simulation::TrueObject object = world_->Truth().front();
+  Judge judge(params.learner.recogniser, object.points);
+  const geometry::Rigid T_world_camera = world_->StartPose();
+  // The second is not what it is said to be: there nothing can be detected.
+  for (const double aside_m : {0.0, 0.5}) {
+    geometry::Rigid T_camera_mesh = T_world_camera.inverse() * object.T_world_object;
+    if (aside_m > 0.0) T_camera_mesh.translation().z() += aside_m;
+    ASSERT_TRUE(judge.Add(world_->Look(T_world_camera, 99), T_camera_mesh));
+  }
+  const ExploreResult result = Explore(*world_, Start(), params, &judge, nullptr);
+  ASSERT_FALSE(result.true_rate_over_time.empty());
+  for (const auto& [time_s, rate] : result.true_rate_over_time) EXPECT_EQ(rate, 1.0) << time_s;
+  EXPECT_EQ(result.true_detection_rate, 0.5);
+}
+
 TEST_F(Table, SameSeedSameRun) {
   ExploreParams params = QuickParams();
   params.planner.max_attempts = 1;
