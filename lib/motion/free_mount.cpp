@@ -28,6 +28,7 @@ constexpr unsigned kNeighbours = 15;     // Connections tried per milestone.
 constexpr double kSampleMargin_m = 0.4;  // Half of the milestones lie this near to the box around start and goals.
 constexpr int kAttemptsPerSample = 20;   // At most so many draws per milestone wanted, where much is blocked.
 constexpr unsigned kShorteningSteps = 60;
+constexpr double kLeastClearance_m = 1e-3;
 
 Position ToPosition(const ob::State* state) {
   const double* values = state->as<ob::RealVectorStateSpace::StateType>()->values;
@@ -113,7 +114,7 @@ std::vector<Rigid> WithOrientations(const std::vector<Position>& positions, cons
 class FreeMount : public Mount {
  public:
   FreeMount(const FreeMountParams& params, const Obstacles& obstacles)
-      : params_(params), world_(obstacles, params.camera_radius_m) {}
+      : params_(params), obstacles_(obstacles), world_(obstacles, params.camera_radius_m + params.clearance_m) {}
 
   std::string WhyUnreachable(const Rigid& T_world_camera) const override {
     const Position position = T_world_camera.translation();
@@ -134,6 +135,7 @@ class FreeMount : public Mount {
   Trajectory Time(const std::vector<Rigid>& poses) const;
 
   FreeMountParams params_;
+  Obstacles obstacles_;
   CollisionWorld world_;
 };
 
@@ -206,6 +208,14 @@ std::vector<PathResult> FreeMount::Plan(const Stance& stance, const std::vector<
   const Rigid& T_world_camera_start = stance.T_world_camera;
   std::vector<PathResult> results(T_world_camera_goals.size());
   const std::string start_refusal = WhyUnreachable(T_world_camera_start);
+  if (start_refusal == kInCollision) {
+    const double left_m = world_.Clearance(T_world_camera_start.translation()) + params_.clearance_m;
+    if (left_m > kLeastClearance_m) {  // An obstacle was seen to be larger than was known on the way here.
+      FreeMountParams closer = params_;
+      closer.clearance_m = left_m - kLeastClearance_m;
+      return FreeMount(closer, obstacles_).Plan(stance, T_world_camera_goals, seed);
+    }
+  }
   const ob::SpaceInformationPtr space = MakeSpace();
   const Position start = T_world_camera_start.translation();
   ob::ScopedState<> from(space), to(space);
@@ -249,6 +259,7 @@ std::vector<PathResult> FreeMount::Plan(const Stance& stance, const std::vector<
 
 void FreeMountParams::Check() const {
   if (!(camera_radius_m > 0.0)) throw std::invalid_argument("camera_radius_m must be > 0, is " + std::to_string(camera_radius_m));
+  if (!(clearance_m >= 0.0)) throw std::invalid_argument("clearance_m must be >= 0, is " + std::to_string(clearance_m));
   for (int i = 0; i < 3; ++i) {
     if (!(workspace_lower_m[i] < workspace_upper_m[i])) {
       throw std::invalid_argument("workspace_lower_m must be < workspace_upper_m along every axis, axis " + std::to_string(i) +

@@ -51,7 +51,9 @@ class Mount {
 };
 
 struct FreeMountParams {
-  double camera_radius_m = 0.06;                        // Sphere around the camera that must stay clear; > 0.
+  double camera_radius_m = 0.06;  // Sphere around the camera that must stay clear; > 0.
+  double clearance_m = 0.02;  // Kept from obstacles beyond that, as they are known to some accuracy only; >= 0. Where the start has
+                              // less, paths keep as much as it has.
   Eigen::Vector3d workspace_lower_m{-1.5, -1.5, -0.5};  // World; the camera's origin stays inside.
   Eigen::Vector3d workspace_upper_m{1.5, 1.5, 2.0};
   int roadmap_samples = 400;  // PRM milestones beside start and goals; >= 0.

@@ -270,6 +270,7 @@ void Fields(Visitor& visit, motion::SpeedLimits& params) {
 template <typename Visitor>
 void Fields(Visitor& visit, motion::FreeMountParams& params) {
   visit("camera_radius_m", params.camera_radius_m);
+  visit("clearance_m", params.clearance_m);
   visit("workspace_lower_m", params.workspace_lower_m);
   visit("workspace_upper_m", params.workspace_upper_m);
   visit("roadmap_samples", params.roadmap_samples);

@@ -91,7 +91,7 @@ TEST(FreeMount, GoesAroundAWall) {
     const auto results = mount->Plan(start, {goal}, seed);
     ASSERT_TRUE(results[0].trajectory) << results[0].refusal;
     const Trajectory& trajectory = *results[0].trajectory;
-    EXPECT_GE(LeastClearance(trajectory, obstacles.boxes, params.camera_radius_m), -1e-4);
+    EXPECT_GE(LeastClearance(trajectory, obstacles.boxes, params.camera_radius_m), params.clearance_m - 1e-4);
     // Around the edge 0.8 m off: at least 1.99 m; the straight line would be 1 m.
     EXPECT_GT(Length(trajectory), 1.95);
     EXPECT_LT(Length(trajectory), 2.5) << "the path is shortened";
@@ -108,6 +108,20 @@ TEST(FreeMount, GoesAroundAWall) {
   }
 }
 
+TEST(FreeMount, StartsWhereAnObstacleGrewNearer) {
+  Obstacles obstacles;
+  obstacles.boxes.push_back(Box("wall", {0, 0, 0}, {0.05, 1.6, 1.6}));
+  const FreeMountParams params;
+  const auto mount = MakeFreeMount(params, obstacles);
+  const double touching = -0.025 - params.camera_radius_m;
+  const auto results = mount->Plan(At(touching - 0.5 * params.clearance_m, 0, 0), {At(-0.5, 0.3, 0), At(0.5, 0, 0)}, 0);
+  for (const PathResult& result : results) {
+    ASSERT_TRUE(result.trajectory) << result.refusal;
+    EXPECT_GE(LeastClearance(*result.trajectory, obstacles.boxes, params.camera_radius_m), 0.5 * params.clearance_m - 2e-3);
+  }
+  EXPECT_EQ(mount->Plan(At(touching + 0.01, 0, 0), {At(-0.5, 0.3, 0)}, 0)[0].refusal, "start in collision");
+}
+
 TEST(FreeMount, ATrajectoryThroughTheTableSceneTouchesNothing) {
   const TableScene scene;
   const FreeMountParams params;
@@ -122,7 +136,7 @@ TEST(FreeMount, ATrajectoryThroughTheTableSceneTouchesNothing) {
     EXPECT_EQ(results[i].refusal == "in collision", touches);
     if (!results[i].trajectory) continue;
     ++found;
-    EXPECT_GE(LeastClearance(*results[i].trajectory, scene.all, params.camera_radius_m), -1e-4) << "goal " << i;
+    EXPECT_GE(LeastClearance(*results[i].trajectory, scene.all, params.camera_radius_m), params.clearance_m - 1e-4) << "goal " << i;
     EXPECT_TRUE(results[i].trajectory->At(1e9).isApprox(goals[i]));
   }
   EXPECT_GT(found, 50);
@@ -239,6 +253,9 @@ TEST(FreeMountParams, CheckNamesTheField) {
   EXPECT_EQ(message(params), "");
   params.camera_radius_m = -1.0;
   EXPECT_NE(message(params).find("camera_radius_m"), std::string::npos);
+  params = {};
+  params.clearance_m = -1.0;
+  EXPECT_NE(message(params).find("clearance_m"), std::string::npos);
   params = {};
   params.workspace_upper_m.z() = -1.0;
   EXPECT_NE(message(params).find("workspace_lower_m"), std::string::npos);
