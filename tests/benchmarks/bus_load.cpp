@@ -1,5 +1,6 @@
 // What of a camera's stream arrives: one sender of 640 x 480 colour and depth, several subscribers, each a process, over real
 // multicast. Run it in a network of its own: tests/system/in_network build/bin/bus_load [--seconds 60] [--busy 2] ...
+#include <sched.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <time.h>
@@ -26,6 +27,7 @@ struct Options {
   double rate_hz = 30.0;
   int subscribers = 4;
   int busy = 0;
+  bool awake = false;
   int buffer_bytes = 212992;
   vantage::messaging::FrameSenderParams sender;
 };
@@ -96,26 +98,36 @@ Subscriber StartSubscriber(const Options& options) {
   return {pid, stop[1], answer[0]};
 }
 
-pid_t StartBusy() {
+pid_t StartBusy(bool only_when_idle) {
   const pid_t pid = fork();
   if (pid == 0) {
+    const sched_param lowest{};
+    if (only_when_idle && sched_setscheduler(0, SCHED_IDLE, &lowest) != 0) _exit(1);
     for (volatile std::uint64_t i = 0;; i = i + 1) {
     }
   }
   return pid;
 }
 
-// Processor time of the whole machine in clock ticks: {idle, all}.
-std::pair<double, double> MachineTicks() {
+// Processor time of the whole machine in clock ticks.
+struct MachineTicks {
+  double all = 0.0;
+  double idle = 0.0;
+  double stolen = 0.0;  // By a hypervisor, while something was to be done.
+};
+
+MachineTicks ReadMachineTicks() {
   std::ifstream file("/proc/stat");
   std::string word;
   file >> word;
-  double all = 0.0, idle = 0.0, value = 0.0;
+  MachineTicks ticks;
+  double value = 0.0;
   for (int i = 0; i < 8 && file >> value; ++i) {
-    all += value;
-    if (i == 3 || i == 4) idle += value;
+    ticks.all += value;
+    if (i == 3 || i == 4) ticks.idle += value;
+    if (i == 7) ticks.stolen += value;
   }
-  return {idle, all};
+  return ticks;
 }
 
 std::vector<vantage::rgbd::Frame> Frames() {
@@ -134,10 +146,11 @@ void Run(const Options& options) {
   std::vector<Subscriber> subscribers;
   for (int i = 0; i < options.subscribers; ++i) subscribers.push_back(StartSubscriber(options));
   std::vector<pid_t> busy;
-  for (int i = 0; i < options.busy; ++i) busy.push_back(StartBusy());
+  for (int i = 0; i < options.busy; ++i) busy.push_back(StartBusy(false));
+  for (unsigned i = 0; options.awake && i < std::thread::hardware_concurrency(); ++i) busy.push_back(StartBusy(true));
   sleep(2);
 
-  const auto ticks = MachineTicks();
+  const MachineTicks ticks = ReadMachineTicks();
   std::int64_t sent = 0, bytes = 0;
   std::vector<double> send_ms;
   {
@@ -154,13 +167,15 @@ void Run(const Options& options) {
       send_ms.push_back(1e-3 * static_cast<double>(bus.now_us() - frame.utime));
     }
   }
-  const auto ticks_after = MachineTicks();
+  const MachineTicks after = ReadMachineTicks();
   sleep(1);
 
   std::sort(send_ms.begin(), send_ms.end());
-  std::printf("%lld frames sent at %.0f Hz, %.0f KB each, encoding and sending %.1f ms (median); machine %.0f %% idle\n",
-              static_cast<long long>(sent), options.rate_hz, 1e-3 * static_cast<double>(bytes) / static_cast<double>(sent),
-              send_ms[send_ms.size() / 2], 100.0 * (ticks_after.first - ticks.first) / (ticks_after.second - ticks.second));
+  std::printf(
+      "%lld frames sent at %.0f Hz, %.0f KB each, encoding and sending %.1f ms (median); machine %.0f %% idle, %.1f %% stolen\n",
+      static_cast<long long>(sent), options.rate_hz, 1e-3 * static_cast<double>(bytes) / static_cast<double>(sent),
+      send_ms[send_ms.size() / 2], 100.0 * (after.idle - ticks.idle) / (after.all - ticks.all),
+      100.0 * (after.stolen - ticks.stolen) / (after.all - ticks.all));
   for (std::size_t i = 0; i < subscribers.size(); ++i) {
     const char word = 1;
     [[maybe_unused]] const auto told = write(subscribers[i].stop, &word, 1);
@@ -187,6 +202,8 @@ int main(int argc, char** argv) {
   app.add_option("--rate", options.rate_hz)->capture_default_str();
   app.add_option("--subscribers", options.subscribers)->capture_default_str();
   app.add_option("--busy", options.busy, "Processes that do nothing but burn a core")->capture_default_str();
+  app.add_flag("--awake", options.awake,
+               "Keep every core from sleeping, by work that yields to any other: a hypervisor may be slow to wake a virtual core");
   app.add_option("--buffer", options.buffer_bytes, "Socket buffer asked for; 212992: what a stock kernel grants")
       ->capture_default_str();
   app.add_option("--part-bytes", options.sender.max_part_bytes)->capture_default_str();
