@@ -64,6 +64,12 @@ struct Trial {
   double confidence() const { return hypothesis() ? alone.front().confidence : 0.0; }
 };
 
+// A share of the trials: those whose number leaves `index` when divided by `of`.
+struct Part {
+  int index = 0;  // In [0, of).
+  int of = 1;     // >= 1.
+};
+
 // Trials for the views from `first_view` on. `backgrounds`: images the object is pasted over (the run's own frames with the objects
 // masked, or photographs); plain grey noise where empty; their features are found where they have none yet. Only as strong interest
 // points count as the first background would have kept. Negatives are whole backgrounds, each once: it is whole models and whole
@@ -72,7 +78,7 @@ struct Trial {
 // one core a trial, two thirds of it interest points.
 std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, std::vector<Background>* backgrounds,
                              const recognition::RecogniserParams& recogniser, const TrialParams& params,
-                             const std::function<void(int done, int of)>& progress = {});
+                             const std::function<void(int done, int of)>& progress = {}, const Part& part = {});
 
 // Both measures from trials: p(o|c) from what was proposed with all views on offer, as the model is used; p(o|theta) from views
 // alone, and from views together how far they fail together. A view counts as detected where its most likely proposal is right and

@@ -278,8 +278,10 @@ void TrialParams::Check() const {
 
 std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, std::vector<Background>* backgrounds,
                              const recognition::RecogniserParams& recogniser, const TrialParams& params,
-                             const std::function<void(int done, int of)>& progress) {
+                             const std::function<void(int done, int of)>& progress, const Part& part) {
   params.Check();
+  if (part.of < 1 || part.index < 0 || part.index >= part.of)
+    throw std::invalid_argument("RunTrials: part.index must be in [0, part.of)");
   for (const Background& background : *backgrounds) {
     if (background.color.empty() || background.color.type() != CV_8UC3)
       throw std::invalid_argument("RunTrials: backgrounds must be CV_8UC3");
@@ -290,14 +292,15 @@ std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, s
   if (first_view >= views) return trials;
   TrialRunner runner(object, backgrounds, recogniser, params);
   const int per_view = params.trials_per_view + runner.Negatives();
+  const int in_part = (per_view - part.index + part.of - 1) / part.of;
   for (int view = first_view; view < views; ++view) {
     const model::View& learned = object.views[static_cast<std::size_t>(view)];
     // A view without depth cannot be shown, one without points cannot be recognised.
     if (learned.points.empty() || learned.keyframe.depth.empty()) continue;
     runner.SetView(view);
-    for (int i = 0; i < per_view; ++i) {
+    for (int i = part.index; i < per_view; i += part.of) {
       trials.push_back(i < params.trials_per_view ? runner.Run(i) : runner.RunNegative(i));
-      if (progress) progress(static_cast<int>(trials.size()), (views - first_view) * per_view);
+      if (progress) progress(static_cast<int>(trials.size()), (views - first_view) * in_part);
     }
   }
   return trials;

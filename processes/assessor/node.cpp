@@ -177,7 +177,8 @@ void AssessorNode::Step() {
 
 void AssessorNode::StartNextJob() {
   for (auto& [name, object] : objects_) {
-    if (object.views <= object.assessed_views || now_us() < object.not_before_us) continue;
+    const bool finished = object.finished && object.views <= object.assessed_views;
+    if (object.views == 0 || finished || now_us() < object.not_before_us) continue;
     if (!std::filesystem::exists(params_.store)) {
       NoteError("the learner has views of '" + name + "', but there is no store " + params_.store + ": give both the same --store");
       object.not_before_us = now_us() + static_cast<std::int64_t>(params_.retry_period_s * 1e6);
@@ -211,6 +212,7 @@ void AssessorNode::OnAssessment(const Assessment& assessment) {
   }
   object.measures = assessment.measures;
   object.assessed_views = assessment.assessed_views;
+  object.finished = assessment.finished;
   object.views = static_cast<int>(assessment.views.size());
   // Views may have come in meanwhile: theirs stay.
   if (assessment.utime >= object.utime) {

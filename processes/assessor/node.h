@@ -56,7 +56,8 @@ class AssessorNode : public messaging::Node {
   // What is known of one object.
   struct Object {
     int views = 0;           // In the store, as the learner says.
-    int assessed_views = 0;  // Whose trials are in the measures.
+    int assessed_views = 0;  // Whose trials, some at least, are in the measures.
+    bool finished = false;   // All trials of these views are.
     std::int64_t utime = 0;  // Capture time of the newest view.
     std::vector<measures::Viewpoint> viewpoints;
     measures::Measures measures;

@@ -13,6 +13,8 @@
 namespace vantage::assessor {
 namespace {
 
+constexpr int kParts = 3;  // In which the trials of a view are run.
+
 struct BrokenOff {};
 
 }  // namespace
@@ -107,6 +109,16 @@ Worker::Known& Worker::Read(const model::Store& store, const std::string& object
   return known;
 }
 
+const model::View* Worker::Next(const Known& known) {
+  const model::View* unfinished = nullptr;
+  for (const model::View& view : known.model->views) {
+    const auto of_view = known.trials.find(view.id);
+    if (of_view == known.trials.end()) return &view;
+    if (of_view->second.parts < kParts && !unfinished) unfinished = &view;
+  }
+  return unfinished;
+}
+
 Assessment Worker::Assess(const std::string& object, const std::optional<rgbd::Frame>& frame) {
   if (frame) AddBackground(*frame);
   const model::Store store(params_.store, model::Store::Mode::kRead);
@@ -117,28 +129,31 @@ Assessment Worker::Assess(const std::string& object, const std::optional<rgbd::F
     reading_ = false;
   }
   changed_.notify_all();
-  const auto& views = known.model->views;
-  const auto next = std::find_if(views.begin(), views.end(), [&](const model::View& view) { return !known.trials.count(view.id); });
-  if (next != views.end()) {
-    std::vector<int> first_views(static_cast<std::size_t>(next - views.begin()) + 1);
+  if (const model::View* next = Next(known)) {
+    std::vector<int> first_views(static_cast<std::size_t>(next - known.model->views.data()) + 1);
     std::iota(first_views.begin(), first_views.end(), 0);
     std::vector<assessment::Background> backgrounds = backgrounds_;
     for (const auto& [name, lookalike] : lookalikes_) {
       if (name != object) backgrounds.push_back(lookalike);
     }
-    known.trials[next->id] = assessment::RunTrials(known.model->OnlyViews(first_views), first_views.back(), &backgrounds,
-                                                   params_.recogniser, params_.trials, [this](int done, int of) {
-                                                     if (stop_) throw BrokenOff();
-                                                     progress_ = static_cast<double>(done) / of;
-                                                   });
+    const auto progress = [this](int done, int of) {
+      if (stop_) throw BrokenOff();
+      progress_ = static_cast<double>(done) / of;
+    };
+    ViewTrials& of_view = known.trials[next->id];
+    const auto trials = assessment::RunTrials(known.model->OnlyViews(first_views), first_views.back(), &backgrounds,
+                                              params_.recogniser, params_.trials, progress, {of_view.parts, kParts});
+    of_view.trials.insert(of_view.trials.end(), trials.begin(), trials.end());
+    ++of_view.parts;
   }
 
   Assessment result;
   result.utime = known.model->views.back().utime;
   result.views = known.model->viewpoints();
   result.assessed_views = static_cast<int>(known.trials.size());
+  result.finished = Next(known) == nullptr;
   std::vector<assessment::Trial> all;
-  for (const auto& [id, trials] : known.trials) all.insert(all.end(), trials.begin(), trials.end());
+  for (const auto& [id, of_view] : known.trials) all.insert(all.end(), of_view.trials.begin(), of_view.trials.end());
   result.measures = assessment::FitMeasures(all, params_.recogniser, params_.trials.observed_fit);
   result.trials = static_cast<int>(all.size());
   return result;

@@ -36,13 +36,13 @@ struct Assessment {
   std::string error;                       // Empty where it worked; then:
   std::int64_t utime = 0;                  // Capture time of the newest view in the store.
   std::vector<measures::Viewpoint> views;  // In the store.
-  int assessed_views = 0;                  // So many of them have had their trials.
+  int assessed_views = 0;                  // So many of them have had trials.
+  bool finished = false;                   // All of them have had all of their trials.
   measures::Measures measures;
   int trials = 0;  // All that the fit is made of.
 };
 
-// The thread only computes: it reads the store and touches no bus. Trials of views assessed before are kept, so that a job costs
-// what is new.
+// The thread only computes: it reads the store and touches no bus. Trials that were run are kept, so that a job costs what is new.
 class Worker {
  public:
   explicit Worker(const WorkerParams& params);
@@ -50,27 +50,35 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  // Assesses the first view of the object that has had no trials yet. `frame`: a background is cut from it; may be empty. Not while
-  // busy.
+  // One part of the trials of a view: of the first view of the object that has had none yet, so that a new view soon counts; else
+  // of the first that has not had all. `frame`: a background is cut from it; may be empty. Not while busy.
   void Start(const std::string& object, std::optional<rgbd::Frame> frame);
   bool busy() const { return busy_; }
   double progress() const { return progress_; }  // Of the job under way, [0, 1].
   // The result, once.
   std::optional<Assessment> Poll();
+  // Cut from the frames so far. Not while busy.
+  const std::vector<assessment::Background>& backgrounds() const { return backgrounds_; }
   // For lock step: waits until the job under way has read the store, and until it is done.
   void WaitUntilRead();
   void WaitUntilDone();
 
  private:
+  struct ViewTrials {
+    std::vector<assessment::Trial> trials;
+    int parts = 0;  // That were run.
+  };
   struct Known {
-    std::shared_ptr<const model::ObjectModel> model;       // As last read from the store.
-    std::map<int, std::vector<assessment::Trial>> trials;  // By the id of the view that was offered.
+    std::shared_ptr<const model::ObjectModel> model;  // As last read from the store.
+    std::map<int, ViewTrials> trials;                 // By the id of the view that was offered.
   };
 
   void Run();
   Assessment Assess(const std::string& object, const std::optional<rgbd::Frame>& frame);
   // Reads the store; trials of views that are no more are forgotten.
   Known& Read(const model::Store& store, const std::string& object);
+  // The view whose turn it is; null when all are done.
+  static const model::View* Next(const Known& known);
   void AddBackground(const rgbd::Frame& frame);
   // Of the store's other objects, each once and as it is then, in the first background.
   void AddLookAlikes(const model::Store& store, const std::string& object);
