@@ -10,10 +10,14 @@
 
 namespace vantage::assessment {
 
-// An image virtual views are pasted over, and that does not show the object itself.
+class StrengthLimit;
+
+// An image virtual views are pasted over, and that does not show the object itself, with what is found out about it on the way: of
+// use for one set of recogniser and trial parameters.
 struct Background {
-  cv::Mat color;                                       // CV_8UC3 BGR.
-  std::shared_ptr<const features::Features> features;  // Of the whole image; null until they are asked for.
+  cv::Mat color;                                                 // CV_8UC3 BGR.
+  std::shared_ptr<const features::Features> features = nullptr;  // Of the whole image; null until they are asked for.
+  std::shared_ptr<StrengthLimit> limit = nullptr;                // Likewise, of the interest points a whole image keeps.
 };
 
 // The image with another object in it, one of its views turned by up to 30 degrees, at a random place: the object at hand must not

@@ -215,12 +215,12 @@ class TrialRunner {
   // Of what a whole image, so disturbed, would keep.
   double MinResponse(const Disturbance& disturbance) {
     if (backgrounds_.empty()) return 0.0;
-    if (!limit_) {
-      Background& background = backgrounds_.front();
-      limit_.emplace(background.color, FeaturesOf(&background), recogniser_params_.features,
-                     cv::Size(params_.image_width, params_.image_height));
+    Background& background = backgrounds_.front();
+    if (!background.limit) {
+      background.limit = std::make_shared<StrengthLimit>(background.color, FeaturesOf(&background), recogniser_params_.features,
+                                                         cv::Size(params_.image_width, params_.image_height));
     }
-    return limit_->Response(disturbance);
+    return background.limit->Response(disturbance);
   }
 
   cv::Mat Window(const geometry::PinholeCamera& camera, Dice* dice) const {
@@ -245,7 +245,6 @@ class TrialRunner {
   const VirtualObject surface_;
   const Eigen::Matrix3Xd points_;
   std::vector<Background>& backgrounds_;
-  std::optional<StrengthLimit> limit_;
   const TrialParams& params_;
   recognition::RecogniserParams recogniser_params_;
   std::unique_ptr<recognition::Recogniser> alone_;     // The view.

@@ -143,6 +143,7 @@ Assessment Worker::Assess(const std::string& object, const std::optional<rgbd::F
     ViewTrials& of_view = known.trials[next->id];
     const auto trials = assessment::RunTrials(known.model->OnlyViews(first_views), first_views.back(), &backgrounds,
                                               params_.recogniser, params_.trials, progress, {of_view.parts, kParts});
+    std::copy_n(backgrounds.begin(), backgrounds_.size(), backgrounds_.begin());  // With what was found out about them.
     of_view.trials.insert(of_view.trials.end(), trials.begin(), trials.end());
     ++of_view.parts;
   }

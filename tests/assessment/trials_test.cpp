@@ -93,6 +93,15 @@ TEST_F(BoardTrials, AreTheSameAgainAndViewByView) {
   const std::vector<Trial> last = RunTrials(object_, last_view, &backgrounds_, recogniser_, params);
   ASSERT_EQ(last.size(), 4u);
   for (std::size_t i = 0; i < last.size(); ++i) EXPECT_TRUE(Same(last[i], all[all.size() - 4 + i])) << i;
+  // In parts: every third, from each of the first three on.
+  std::size_t in_parts = 0;
+  for (int part = 0; part < 3; ++part) {
+    const std::vector<Trial> some = RunTrials(object_, last_view, &backgrounds_, recogniser_, params, {}, {part, 3});
+    for (std::size_t i = 0; i < some.size(); ++i)
+      EXPECT_TRUE(Same(some[i], last.at(static_cast<std::size_t>(part) + 3 * i))) << part;
+    in_parts += some.size();
+  }
+  EXPECT_EQ(in_parts, last.size());
   params.seed = 6;
   EXPECT_FALSE(Same(RunTrials(object_, last_view, &backgrounds_, recogniser_, params)[0], last[0]));
   EXPECT_TRUE(RunTrials(object_, last_view + 1, &backgrounds_, recogniser_, params).empty());
