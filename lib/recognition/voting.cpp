@@ -19,33 +19,30 @@ std::vector<VoteCluster> MeanShift(const std::vector<Vote>& votes, double bandwi
   std::vector<double> reach_px2;  // Squared.
   for (const Vote& vote : votes) reach_px2.push_back(bandwidth * vote.radius_px * bandwidth * vote.radius_px);
   std::vector<Eigen::Vector2d> modes;
-  // Climbs that come to the very same place go on as one, and most do: the mean depends on which votes are in reach alone.
-  std::map<std::pair<double, double>, Eigen::Vector2d> top_from;
-  std::vector<std::pair<double, double>> passed;
+  // Most climbs come to a place where another was: the mean depends on which votes are in reach alone.
+  std::map<std::pair<double, double>, Eigen::Vector2d> mean_about;
+  const auto mean_of = [&](const Eigen::Vector2d& place) {
+    const auto [known, is_new] = mean_about.try_emplace({place.x(), place.y()}, place);
+    if (!is_new) return known->second;
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    double weight = 0.0;
+    for (size_t i = 0; i < votes.size(); ++i) {
+      const Vote& vote = votes[i];
+      if ((vote.centre - place).squaredNorm() > reach_px2[i]) continue;
+      sum += vote.weight * vote.centre;
+      weight += vote.weight;
+    }
+    if (weight > 0.0) known->second = sum / weight;
+    return known->second;
+  };
   for (const Vote& start : votes) {
     Eigen::Vector2d mode = start.centre;
-    passed.clear();
     for (int step = 0; step < kMaxSteps; ++step) {
-      Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-      double weight = 0.0;
-      for (size_t i = 0; i < votes.size(); ++i) {
-        const Vote& vote = votes[i];
-        if ((vote.centre - mode).squaredNorm() > reach_px2[i]) continue;
-        sum += vote.weight * vote.centre;
-        weight += vote.weight;
-      }
-      if (weight <= 0.0) break;
-      const Eigen::Vector2d next = sum / weight;
+      const Eigen::Vector2d next = mean_of(mode);
       const bool still = (next - mode).norm() < 0.05;
       mode = next;
       if (still) break;
-      if (const auto known = top_from.find({mode.x(), mode.y()}); known != top_from.end()) {
-        mode = known->second;
-        break;
-      }
-      passed.emplace_back(mode.x(), mode.y());
     }
-    for (const auto& place : passed) top_from.emplace(place, mode);
     modes.push_back(mode);
   }
   std::vector<VoteCluster> clusters;
