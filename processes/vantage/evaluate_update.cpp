@@ -27,7 +27,7 @@ struct Options {
 
 struct Updates {
   std::vector<double> cpu_s, wall_s;  // Of each view, until it counts.
-  std::vector<double> rest_cpu_s;     // Of each view, for the rest of its trials.
+  double rest_cpu_s = 0.0;            // Of all views, for the rest of their trials.
   measures::Measures measures;        // When the last view came to count, and no view had had all its trials.
   measures::Measures finished;        // When all trials were done.
   std::vector<assessment::Background> backgrounds;
@@ -65,14 +65,14 @@ Updates Update(const std::string& store, const model::ObjectModel& object, const
     updates.wall_s.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count());
     std::cerr << "\rview " << view + 1 << " of " << object.views.size() << std::flush;
   }
+  std::cerr << "; the rest of their trials" << std::flush;
+  const std::clock_t cpu = std::clock();
   for (bool finished = false; !finished;) {
-    const std::clock_t cpu = std::clock();
     const assessor::Assessment assessed = NextPart(worker, object.name, std::nullopt);
-    updates.rest_cpu_s.push_back(SecondsSince(cpu));
     updates.finished = assessed.measures;
     finished = assessed.finished;
-    std::cerr << "\rthe rest of view " << updates.rest_cpu_s.size() << " of " << object.views.size() << std::flush;
   }
+  updates.rest_cpu_s = SecondsSince(cpu);
   std::cerr << '\n';
   updates.backgrounds = worker.backgrounds();
   return updates;
@@ -110,10 +110,11 @@ void RunEvaluateUpdate(const Options& options) {
             {"observed_largest_difference", observed_difference(of)},
             {"halfway_deg", of.predicted.HalfwayRotation() * 180.0 / M_PI}};
   };
+  const double rest_cpu_s = updates.rest_cpu_s / static_cast<double>(object.views.size());
   const Json result = {{"object", object.name},
                        {"views", object.views.size()},
                        {"cpu_s", Seconds(updates.cpu_s)},
-                       {"rest_cpu_s", Seconds(updates.rest_cpu_s)},
+                       {"rest_cpu_s", rest_cpu_s},
                        {"wall_s", Seconds(updates.wall_s)},
                        {"images_full", trials.size()},
                        {"counted", figures(updates.measures)},
@@ -123,7 +124,7 @@ void RunEvaluateUpdate(const Options& options) {
   text.precision(3);
   text << object.name << ", " << object.views.size() << " views one after another: " << Quantile(updates.cpu_s, 0.5)
        << " s of one core until a view counts (at most " << Quantile(updates.cpu_s, 1.0) << "; wall "
-       << Quantile(updates.wall_s, 0.5) << ", " << Quantile(updates.wall_s, 1.0) << "), " << Quantile(updates.rest_cpu_s, 0.5)
+       << Quantile(updates.wall_s, 0.5) << ", " << Quantile(updates.wall_s, 1.0) << "), " << rest_cpu_s
        << " s for the rest of its trials\n";
   const auto line = [&](const std::string& when, const measures::Measures& of) {
     text << when << ": completeness " << completeness(of) << ", p(o|c) differs by " << observed_difference(of)
