@@ -35,7 +35,8 @@ struct PlannerParams {
   double time_budget_s = 900.0;      // Stop when that much robot time has passed; > 0.
   int max_attempts = 60;             // Stop after so many learning attempts; >= 1.
   bool choose_by_rate = true;        // Among views worth their cost: the most utility a second; false: the most utility.
-  double failure_radius_rad = 0.17;  // An attempt that did not detect it lowers the belief in views this near; >= 0...
+  double failure_radius_rad = 0.17;  // An attempt that added no view though one was wanted lowers the belief in views this near;
+                                     // >= 0...
   double failure_discount = 0.3;     // ...by this factor each time, until a view is added from where it matters; [0, 1).
   int max_path_goals = 200;          // Paths are planned for so many candidates at once, greatest worth * P * gain first, and
                                      // for more only while none of those is worth its trip; >= 1.
@@ -92,9 +93,10 @@ struct Attempt {
   measures::Viewpoint viewpoint;
   bool detected = false;  // The object was found and tracked there.
   bool view_added = false;
-  double t_plan_s = 0.0;   // What it really took; >= 0.
-  double t_learn_s = 0.0;  // Likewise.
-  bool looked = true;      // The camera got there: only then the attempt tells of P(detect) and of t_learn_s.
+  bool well_known = false;  // The learner's confidence there was so high that it wants no other view.
+  double t_plan_s = 0.0;    // What it really took; >= 0.
+  double t_learn_s = 0.0;   // Likewise.
+  bool looked = true;       // The camera got there: only then the attempt tells of P(detect) and of t_learn_s.
 };
 
 // What the planner knows of the object's model.

@@ -65,7 +65,7 @@ double AttemptOdds::Probability(double predicted) const {
 }
 
 void FailureMemory::Note(const Attempt& attempt) {
-  if (!attempt.detected) failures_.push_back(attempt.viewpoint);
+  if (!attempt.view_added && !attempt.well_known) failures_.push_back(attempt.viewpoint);
   if (!attempt.view_added) return;
   const auto outdated = [&](const measures::Viewpoint& failure) {
     return geometry::AngleBetween(failure.direction, attempt.viewpoint.direction) < kMatters_rad;

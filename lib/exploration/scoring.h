@@ -53,8 +53,8 @@ class AttemptOdds {
   std::vector<Outcome> outcomes_;
 };
 
-// Attempts that did not detect the object lower the belief in views near by until one is added from less than kMatters_rad away:
-// from further off the new view says nothing about the place.
+// Attempts that added no view lower the belief in views near by until one is added from less than kMatters_rad away: from further
+// off the new view says nothing about the place. Where the object was well known no view was wanted: that is no failure.
 class FailureMemory {
  public:
   FailureMemory(double radius_rad, double discount) : radius_rad_(radius_rad), discount_(discount) {}

@@ -53,7 +53,7 @@ void SharedStrategy::Report(const Attempt& attempt) {
     throw std::invalid_argument("an attempt's t_plan_s and t_learn_s must be >= 0 and finite");
   }
   attempted_.push_back(attempt.viewpoint);
-  if (attempt.detected && !attempt.view_added) well_known_.push_back(attempt.viewpoint);
+  if (attempt.well_known && !attempt.view_added) well_known_.push_back(attempt.viewpoint);
   failures_.Note(attempt);
   t_plan_s_.Add(attempt.t_plan_s);
   if (attempt.looked) t_learn_s_.Add(attempt.t_learn_s);

@@ -36,7 +36,7 @@ class SharedStrategy : public Strategy {
 
   double FailureFactor(const measures::Viewpoint& view) const { return failures_.Factor(view); }
   const std::vector<measures::Viewpoint>& attempted() const { return attempted_; }  // All that were reported.
-  // Where the object was detected, but the learner took no view: it is known from there, or there is nothing to learn.
+  // Where the learner wanted no view: there is nothing to learn.
   const std::vector<measures::Viewpoint>& well_known() const { return well_known_; }
 
   // Another one after every attempt; the same decision asked for twice is the same decision.

@@ -7,6 +7,7 @@
 
 #include "assessment/background.h"
 #include "geometry/rigid.h"
+#include "session/attempt.h"
 #include "session/scene_map.h"
 
 namespace vantage::session {
@@ -84,13 +85,13 @@ class Run {
     stance_ = {*frame.T_world_camera, end.joints_rad};
     const learning::LearnerResult learned = learner_.Process(frame);
     NoteScene(frame, learned.view_added);
-    Log(chosen, learned);
     exploration::Attempt attempt;
     attempt.viewpoint = chosen.view.viewpoint;
-    attempt.detected = result_.log.back().detected;
+    NoteFrame(learned, {params_.learner.min_track_probability, params_.learner.new_view_confidence}, attempt);
     attempt.view_added = learned.view_added;
     attempt.t_plan_s = params_.planner.t_plan_s;
     attempt.t_learn_s = params_.planner.t_learn_s;
+    Log(chosen, learned, attempt);
     strategy_->Report(attempt);
     if (learned.view_added) {
       LearnedView(frame);
@@ -101,7 +102,7 @@ class Run {
     Tell(learned.view_added ? "view added" : learned.note, &decision);
   }
 
-  void Log(const exploration::Candidate& chosen, const learning::LearnerResult& learned) {
+  void Log(const exploration::Candidate& chosen, const learning::LearnerResult& learned, const exploration::Attempt& attempt) {
     const exploration::Belief belief = BeliefNow();
     const auto before = static_cast<std::ptrdiff_t>(belief.views.size()) - (learned.view_added ? 1 : 0);
     const std::vector<measures::Viewpoint> views(belief.views.begin(), belief.views.begin() + before);
@@ -116,7 +117,7 @@ class Run {
           std::min(entry.nearest_view_rad, geometry::AngleBetween(view.direction, chosen.view.viewpoint.direction));
     }
     entry.move_s = chosen.t_move_s;
-    entry.detected = learned.state == learning::State::kTracking && learned.probability >= params_.learner.min_track_probability;
+    entry.detected = attempt.detected;
     entry.view_added = learned.view_added;
     entry.note = learned.note;
     result_.log.push_back(entry);

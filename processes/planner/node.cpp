@@ -81,7 +81,7 @@ void PlannerNode::OnTrack(const track_t& message) {
   if (phase_ != Phase::kLooking) return;
   if (track->utime < look_.arrived_us + static_cast<std::int64_t>(params_.settle_s * 1e6)) return;
   ++look_.frames;
-  look_.detected |= track->result.state == learning::State::kTracking && track->result.probability >= params_.min_track_probability;
+  session::NoteFrame(track->result, params_.learner, look_.seen);
   look_.view_coming |= track->result.view_added;
   look_.note = track->result.note;
 }
@@ -268,10 +268,10 @@ void PlannerNode::LookAround() {
 }
 
 void PlannerNode::EndAttempt(bool reached) {
-  exploration::Attempt attempt;
+  exploration::Attempt attempt = reached ? look_.seen : exploration::Attempt();
   attempt.viewpoint = decision_->candidates[static_cast<std::size_t>(decision_->chosen)].view.viewpoint;
   attempt.view_added = views() > views_at_departure_;
-  attempt.detected = reached && (look_.detected || attempt.view_added);
+  attempt.detected |= reached && attempt.view_added;
   attempt.t_plan_s = plan_s_;
   attempt.looked = reached;
   attempt.t_learn_s = reached ? ElapsedSince(look_.since_us) : 0.0;

@@ -13,6 +13,7 @@
 #include "messaging/mount_messages.h"
 #include "messaging/node.h"
 #include "messaging/planner_messages.h"
+#include "session/attempt.h"
 
 namespace vantage::planner {
 
@@ -35,7 +36,7 @@ struct PlannerNodeParams {
   double table_height_m = 0.75;   // Above the floor; > 0.
   std::string summary;            // A JSON file to write at the end; empty: none.
   bool exit_when_done = false;    // The process ends with the run.
-  double min_track_probability = 0.7;  // The learner's: an attempt that finds the object less surely did not detect it.
+  session::LearnerWants learner;  // What an attempt came to is judged by these.
   exploration::PlannerParams planner;
   exploration::CandidateParams candidates;
   motion::MountParams mount;
@@ -71,8 +72,8 @@ class PlannerNode : public messaging::Node {
     std::int64_t arrived_us = 0;
     std::int64_t since_us = 0;  // By our clock.
     int frames = 0;
-    bool detected = false;
-    bool view_coming = false;  // The learner has a new view; LEARNER_VIEW says when it is durable.
+    exploration::Attempt seen;  // In them.
+    bool view_coming = false;   // The learner has a new view; LEARNER_VIEW says when it is durable.
     std::string note;
   };
 

@@ -36,7 +36,7 @@ PlannerNodeParams LoadPlannerNodeParams(const std::string& config_file, const st
   if (!library_file.empty()) {
     const auto library = params::LoadLibraryParams(library_file);
     params.planner = library.planner;
-    params.min_track_probability = library.learner.min_track_probability;
+    params.learner = {library.learner.min_track_probability, library.learner.new_view_confidence};
     params.candidates = library.candidates;
     params.mount = library.mount;
   }

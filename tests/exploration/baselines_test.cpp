@@ -21,7 +21,7 @@ std::vector<CandidateView> Visited(Strategy& strategy, Belief belief, const std:
     visited.push_back(decision.candidates[static_cast<std::size_t>(decision.chosen)].view);
     pose = visited.back().T_world_camera;
     belief.views.push_back(visited.back().viewpoint);
-    strategy.Report({visited.back().viewpoint, true, true, 0.5, 1.0});
+    strategy.Report({visited.back().viewpoint, true, true, false, 0.5, 1.0});
   }
   return visited;
 }
@@ -89,7 +89,7 @@ TEST(Coverage, DoesNotGoWhereItWas) {
     ASSERT_GE(decision.chosen, 0);
     const Candidate& chosen = decision.candidates[static_cast<std::size_t>(decision.chosen)];
     EXPECT_TRUE(ids.insert(chosen.view.id).second);
-    strategy->Report({chosen.view.viewpoint, false, false, 0.5, 1.0});
+    strategy->Report({chosen.view.viewpoint, false, false, false, 0.5, 1.0});
   }
 }
 

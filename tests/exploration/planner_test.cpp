@@ -161,12 +161,28 @@ TEST(Planner, NothingIsToBeGainedWhereItIsWellKnown) {
   const auto decide = [&] { return strategy->Decide(belief, ring, ring[0].T_world_camera, TestMount(), 0.0); };
   const Decision before = decide();
   const measures::Viewpoint place = Chosen(before).view.viewpoint;
-  strategy->Report({place, true, false, 0.5, 1.0});  // Seen, but no view came of it.
+  strategy->Report({place, true, false, true, 0.5, 1.0});  // Seen, and no view was wanted.
   const Decision after = decide();
   EXPECT_EQ(after.completeness, before.completeness) << "it is no view";
   EXPECT_LT(after.candidates[static_cast<std::size_t>(before.chosen)].gain, 1e-9 + 0.3 * Chosen(before).gain);
   EXPECT_EQ(after.candidates[static_cast<std::size_t>(before.chosen)].refusal, "too near to a learned view");
   EXPECT_GT(geometry::AngleBetween(Chosen(after).view.viewpoint.direction, place.direction), 0.24);
+}
+
+// It was found, but no view came of it for another reason than that it is known: one is wanted still, but not at any price.
+TEST(Planner, WhereNoViewCameOfItThereIsStillSomethingToLearn) {
+  const auto ring = Ring(5.0);
+  const Belief belief = BeliefFrom({ring[0]}, ring);
+  const auto strategy = MakeStrategy("planner", {}, 0);
+  const auto decide = [&] { return strategy->Decide(belief, ring, ring[0].T_world_camera, TestMount(), 0.0); };
+  const Decision before = decide();
+  const auto index = static_cast<std::size_t>(before.chosen);
+  strategy->Report({Chosen(before).view.viewpoint, true, false, false, 0.5, 1.0});
+  const Decision after = decide();
+  EXPECT_EQ(after.candidates[index].gain, before.candidates[index].gain);
+  EXPECT_NE(after.candidates[index].refusal, "too near to a learned view");
+  EXPECT_LT(after.candidates[index].detect_probability, 0.5 * before.candidates[index].detect_probability);
+  EXPECT_NE(after.chosen, before.chosen);
 }
 
 TEST(Planner, LearnsWhatThingsReallyTake) {
@@ -200,7 +216,7 @@ TEST(Planner, LearnsHowOftenAttemptsDetect) {
     EXPECT_NEAR(probability(), predicted, 1e-12);
     for (int i = 0; i < 12; ++i) {
       probability();
-      strategy->Report({{Direction(180.0), 0.6}, detected, detected, 0.5, 1.0});
+      strategy->Report({{Direction(180.0), 0.6}, detected, detected, false, 0.5, 1.0});
     }
     if (detected) {
       EXPECT_GT(probability(), predicted + 0.05);
@@ -242,7 +258,7 @@ struct StopTest : testing::TestWithParam<const char*> {
 
   Decision Decide(double elapsed_s = 0.0, int attempts = 0) {
     const auto strategy = MakeStrategy(GetParam(), params, 0);
-    for (int i = 0; i < attempts; ++i) strategy->Report({{Direction(180.0), 0.6}, true, true, 0.5, 1.0});
+    for (int i = 0; i < attempts; ++i) strategy->Report({{Direction(180.0), 0.6}, true, true, false, 0.5, 1.0});
     const Decision decision = strategy->Decide(belief, ring, ring[0].T_world_camera, mount, elapsed_s);
     EXPECT_EQ(decision.chosen < 0, decision.stop != StopReason::kNone);
     return decision;
@@ -314,7 +330,9 @@ struct LoopResult {
   double completeness = 0.0, elapsed_s = 0.0;
 };
 
-LoopResult RunLoop(const std::string& name, const std::function<bool(const Candidate&)>& succeeds, std::uint32_t seed = 0) {
+// `seen`: it is detected also where no view comes of it.
+LoopResult RunLoop(const std::string& name, const std::function<bool(const Candidate&)>& succeeds, std::uint32_t seed = 0,
+                   bool seen = false) {
   const auto ring = Ring(5.0);
   const TestMount mount;
   Belief belief = BeliefFrom({ring[0]}, ring);
@@ -332,7 +350,7 @@ LoopResult RunLoop(const std::string& name, const std::function<bool(const Candi
     result.ids.push_back(chosen.view.id);
     const bool added = succeeds(chosen);
     if (added) belief.views.push_back(chosen.view.viewpoint);
-    strategy->Report({chosen.view.viewpoint, added, added, 0.5, 1.0});
+    strategy->Report({chosen.view.viewpoint, added || seen, added, false, 0.5, 1.0});
   }
   return result;
 }
@@ -353,6 +371,10 @@ TEST(Loop, AFailedAttemptIsNotRepeatedForEver) {
   EXPECT_EQ(one_side.stop, StopReason::kNothingWorthwhile);
   EXPECT_LT(one_side.ids.size(), 40u);
   EXPECT_GT(one_side.completeness, 0.5);
+  const LoopResult seen_only = RunLoop(
+      "planner", [](const Candidate&) { return false; }, 0, true);
+  EXPECT_EQ(seen_only.stop, StopReason::kNothingWorthwhile);
+  EXPECT_LT(seen_only.ids.size(), 30u);
 }
 
 TEST(Loop, RandomTriesEveryViewOnceAndThenStops) {
@@ -374,7 +396,7 @@ TEST(Loop, RandomStopsWhereNothingIsLeft) {
   for (std::size_t i = 0; i < ring.size(); ++i) {
     const Decision decision = strategy->Decide(belief, ring, ring[0].T_world_camera, TestMount(), 0.0);
     ASSERT_GE(decision.chosen, 0);
-    strategy->Report({Chosen(decision).view.viewpoint, false, false, 0.5, 1.0});
+    strategy->Report({Chosen(decision).view.viewpoint, false, false, false, 0.5, 1.0});
   }
   const Decision last = strategy->Decide(belief, ring, ring[0].T_world_camera, TestMount(), 0.0);
   EXPECT_EQ(last.stop, StopReason::kNothingReachable);

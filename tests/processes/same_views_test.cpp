@@ -28,6 +28,15 @@ bool Learns(const measures::Viewpoint& viewpoint, const std::vector<measures::Vi
   return viewpoint.direction.x() > -0.6 && measures::DetectionProbability(views, viewpoint, Falling()) > 0.3;
 }
 
+// ...and on one side it sees it well where it adds none.
+learning::LearnerResult Sees(const measures::Viewpoint& viewpoint, bool added) {
+  learning::LearnerResult seen;
+  seen.state = learning::State::kTracking;
+  seen.probability = added || viewpoint.direction.x() < -0.6 ? 0.9 : 0.2;
+  seen.confidence.value = viewpoint.direction.y() > 0.0 ? 0.7 : 0.3;
+  return seen;
+}
+
 geometry::Rigid ObjectPose() {
   geometry::Rigid T_world_object = geometry::Rigid::Identity();
   T_world_object.translation() = Eigen::Vector3d(0.0, 0.0, 0.1);
@@ -94,6 +103,7 @@ class SameViews : public ::testing::TestWithParam<const char*> {
     track.utime = now_us_;
     track.object = kObject;
     track.T_world_object = ObjectPose();
+    track.result = sees_;
     track.views = static_cast<int>(views_.size());
     bus_.Publish(messaging::kLearnerTrack, messaging::ToMessage(track));
   }
@@ -112,6 +122,7 @@ class SameViews : public ::testing::TestWithParam<const char*> {
   messaging::MountState state_;
   messaging::Scene scene_;
   std::vector<measures::Viewpoint> views_;
+  learning::LearnerResult sees_;  // Just now.
   std::optional<motion::Trajectory> command_;
 };
 
@@ -137,6 +148,7 @@ TEST_P(SameViews, AsTheLoopOfTheLibrary) {
     const measures::Viewpoint viewpoint = exploration::ViewpointOf(end.T_world_mount, ObjectPose());
     const bool added = Learns(viewpoint, views_);
     if (added) views_.push_back(viewpoint);
+    sees_ = Sees(viewpoint, added);
     Tell(added);
     Step(node, 0.0);
   }
@@ -166,7 +178,9 @@ TEST_P(SameViews, AsTheLoopOfTheLibrary) {
     const measures::Viewpoint viewpoint = exploration::ViewpointOf(end.T_world_mount, ObjectPose());
     const bool added = Learns(viewpoint, belief.views);
     if (added) belief.views.push_back(viewpoint);
-    strategy->Report({chosen.view.viewpoint, added, added, 0.0, kLearn_s});
+    exploration::Attempt attempt{chosen.view.viewpoint, false, added, false, 0.0, kLearn_s};
+    session::NoteFrame(Sees(viewpoint, added), params_.learner, attempt);
+    strategy->Report(attempt);
   }
   EXPECT_EQ(node.status().stop_reason, exploration::ToString(stop));
   ASSERT_EQ(process_went.size(), library_went.size());
