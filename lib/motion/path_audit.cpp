@@ -102,9 +102,10 @@ PathAudit AuditPath(const Trajectory& path, const BodyAt& body, const Obstacles&
         Note(DistanceToBox(ball.centre_in_world, box) - ball.radius_m, box.name, time_s, audit);
       }
       for (const Cloud& cloud : clouds) {
-        const double distance_m = DistanceToCloud(ball.centre_in_world, cloud, audit.clearance_m + ball.radius_m);
-        // A point within the tolerance counts as inside.
-        Note(distance_m - std::max(ball.radius_m, kAuditTolerance_m), cloud.obstacle->name, time_s, audit);
+        const double radius_m = std::max(ball.radius_m, kAuditTolerance_m);  // A point within the tolerance counts as inside.
+        // What is taken off is added first: a loose bound must not count as nearer than all before it.
+        const double distance_m = DistanceToCloud(ball.centre_in_world, cloud, audit.clearance_m + radius_m);
+        Note(distance_m - radius_m, cloud.obstacle->name, time_s, audit);
       }
     }
   }

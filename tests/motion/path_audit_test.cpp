@@ -54,6 +54,25 @@ TEST(PathAudit, FindsAThinWallAndAPointInside) {
   EXPECT_EQ(AuditPath(Straight({-0.5, 1, 0}, {0.5, 1, 0}), CameraBall(0.1), ball).clearance_m, kFarAudit_m);
 }
 
+// Many points of a body that pass by: what each of them leaves undecided must not add up to a touch.
+TEST(PathAudit, ManyPointsAreNoNearerThanTheNearest) {
+  Obstacles obstacles;
+  obstacles.hulls.push_back({"cube", CubeCorners({0, 0, 0}, 0.2)});
+  obstacles.hulls.push_back(Ball({0.1, 0.25, 0}, 0.1));
+  const auto sheet = [](const Waypoint& waypoint) {
+    MountBody body;
+    for (int x = -10; x <= 10; ++x) {
+      for (int y = -10; y <= 10; ++y)
+        body.balls.push_back({waypoint.T_world_mount * Eigen::Vector3d(0.02 * x, 0.02 * y, 0.0), 0.0});
+    }
+    return body;
+  };
+  for (const double gap_m : {0.03, 0.01, 0.002}) {
+    const double height_m = 0.1 + gap_m;
+    EXPECT_NEAR(AuditPath(Straight({-0.5, 0, height_m}, {0.5, 0.1, height_m}), sheet, obstacles, 0.02).clearance_m, gap_m, 0.001);
+  }
+}
+
 TEST(PathAudit, AgreesWithThePlannerAboutPlannedPathsAndNotAboutStraightOnes) {
   Obstacles obstacles;
   obstacles.boxes.push_back(Box("wall", {0, 0, 0.3}, {0.05, 0.8, 0.8}));
