@@ -54,5 +54,35 @@ TEST(SceneMap, ObjectsGrowAsTheyAreSeenFromMoreSides) {
       << "what is not explored is there too";
 }
 
+// Seen from so high that the top shows, corners included.
+TEST(SceneMap, NoPartOfABoxSticksOutOfWhatOneFrameTells) {
+  simulation::WorldParams params;
+  simulation::ObjectParams box;
+  box.name = "box";
+  box.box_m = {0.07, 0.16, 0.21};
+  box.faces = {"box.png"};
+  params.objects.push_back(box);
+  const simulation::SimulatedWorld world(params);
+  const simulation::TrueObject object = world.Truth().front();
+  for (const double elevation_deg : {30.0, 45.0, 65.0}) {
+    for (const double azimuth_deg : {0.0, 20.0, 45.0, 70.0}) {
+      SCOPED_TRACE("from " + std::to_string(azimuth_deg) + ", " + std::to_string(elevation_deg));
+      const double azimuth = azimuth_deg * M_PI / 180.0, elevation = elevation_deg * M_PI / 180.0;
+      const Eigen::Vector3d centre(0.0, 0.0, 0.1),
+          direction(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation), std::sin(elevation));
+      const rgbd::Frame frame = world.Look(geometry::LookAt(centre + 0.55 * direction, centre, Eigen::Vector3d::UnitZ()), 7);
+      const auto plane = segmentation::FitPlane(frame, {});
+      ASSERT_TRUE(plane.has_value());
+      SceneMap map;
+      map.Add(frame, *plane, segmentation::FindClusters(frame, *plane, {}));
+      double most_m = 0.0;
+      for (Eigen::Index i = 0; i < object.points.cols(); i += 2) {
+        most_m = std::max(most_m, DistanceToHulls(object.T_world_object * Eigen::Vector3d(object.points.col(i)), map.hulls()));
+      }
+      EXPECT_LT(most_m, 0.01);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace vantage::session
