@@ -15,7 +15,7 @@ namespace vantage::assessment {
 
 struct TrialParams {
   int trials_per_view = 40;        // Virtual images per learned view, each offering only that view; >= 1.
-  int negatives_per_view = 10;     // Images without the object, each another background as long as there are; >= 0.
+  int negatives_per_view = 12;     // Images without the object, each another background as long as there are; >= 0.
   double max_rotation_deg = 60.0;  // Out of plane, uniform in 0..max; (0, 90].
   double min_elevation_deg = 0.0;  // No camera is lower (object z up): below is the table; [-90, 90).
   double max_scale_octaves = 1.0;  // Distances +-max about the views' median, mostly near it: 1 = 0.5..2 times; >= 0.
@@ -74,8 +74,9 @@ struct Part {
 // masked, or photographs); plain grey noise where empty; their features are found where they have none yet. Only as strong interest
 // points count as the first background would have kept. Negatives are whole backgrounds, each once: it is whole models and whole
 // images that make wrong detections. Deterministic in (model, params, backgrounds); a view's dice do not depend on first_view, but
-// views learned later change what earlier ones look like from aside. `progress` is called after every trial. Cost: about 90 ms of
-// one core a trial, two thirds of it interest points.
+// views learned later change what earlier ones look like from aside. `progress` is called after every trial; what it throws comes
+// out. Throws std::invalid_argument for params, a part or a first_view out of range and backgrounds that are not CV_8UC3. Cost:
+// about 90 ms of one core a trial, two thirds of it interest points.
 std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, std::vector<Background>* backgrounds,
                              const recognition::RecogniserParams& recogniser, const TrialParams& params,
                              const std::function<void(int done, int of)>& progress = {}, const Part& part = {});
@@ -85,6 +86,9 @@ std::vector<Trial> RunTrials(const model::ObjectModel& object, int first_view, s
 // has p(o|c) >= 1/2.
 measures::Measures FitMeasures(const std::vector<Trial>& trials, const recognition::RecogniserParams& recogniser,
                                measures::ObservedFit observed_fit = measures::ObservedFit::kGaussians);
+
+// The first of them alone.
+measures::ObservedSuccess FitObserved(const std::vector<Trial>& trials, measures::ObservedFit fit);
 
 // Of the viewpoints' distances, the upper of two middle ones, metres; 1 without viewpoints.
 double MedianDistance(const std::vector<measures::Viewpoint>& viewpoints);

@@ -7,16 +7,18 @@
 
 namespace vantage::assessment {
 
-measures::Measures FitMeasures(const std::vector<Trial>& trials, const recognition::RecogniserParams& recogniser,
-                               measures::ObservedFit observed_fit) {
-  measures::Measures measures;
+measures::ObservedSuccess FitObserved(const std::vector<Trial>& trials, measures::ObservedFit fit) {
   std::vector<measures::ConfidenceSample> proposals;
   for (const Trial& trial : trials) {
     for (const Proposal& proposal : trial.together) proposals.push_back({proposal.confidence, proposal.correct});
   }
-  measures.observed =
-      measures::ObservedSuccess::Fit(proposals, measures::Source::kOwn, measures::ObservedSuccess::kPriorCount, observed_fit);
+  return measures::ObservedSuccess::Fit(proposals, measures::Source::kOwn, measures::ObservedSuccess::kPriorCount, fit);
+}
 
+measures::Measures FitMeasures(const std::vector<Trial>& trials, const recognition::RecogniserParams& recogniser,
+                               measures::ObservedFit observed_fit) {
+  measures::Measures measures;
+  measures.observed = FitObserved(trials, observed_fit);
   const auto is_detected = [&](const std::vector<Proposal>& proposed) {
     return !proposed.empty() && proposed.front().correct && measures.observed.Probability(proposed.front().confidence) >= 0.5;
   };

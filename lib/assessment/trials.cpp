@@ -138,7 +138,7 @@ class TrialRunner {
     return trial;
   }
 
-  // A whole background where there is one.
+  // A whole background where there is one: the next for each number from trials_per_view on, whichever part it is in.
   Trial RunNegative(int number) {
     Dice dice({params_.seed, static_cast<std::uint32_t>(view_), static_cast<std::uint32_t>(number)});
     Trial trial;
@@ -154,7 +154,7 @@ class TrialRunner {
       Disturb(RandomDisturbance(&dice, &trial), dice.Bits(), &frame.color);
       features = together_->Extract(frame);
     } else {
-      Background& background = backgrounds_[static_cast<std::size_t>(number) % backgrounds_.size()];
+      Background& background = backgrounds_[static_cast<std::size_t>(number - params_.trials_per_view)];
       frame.color = background.color;
       frame.camera.width = background.color.cols;
       frame.camera.height = background.color.rows;

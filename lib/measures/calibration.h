@@ -42,4 +42,10 @@ Interval BootstrapInterval(const std::vector<std::vector<Forecast>>& groups,
                            const std::function<double(const std::vector<Forecast>&)>& statistic, int resamples = 1000,
                            double level = 0.95, std::uint32_t seed = 0);
 
+// Likewise of the mean of a table, all rows equally long, where both rows (models, say) and columns (frames that all of them were
+// judged on) are samples: both are drawn anew (Owen, 2007: rather too wide than too narrow). {0, 0} for an empty table. Throws also
+// where rows differ in length.
+Interval BootstrapMeanInterval(const std::vector<std::vector<double>>& table, int resamples = 1000, double level = 0.95,
+                               std::uint32_t seed = 0);
+
 }  // namespace vantage::measures

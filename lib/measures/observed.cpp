@@ -148,7 +148,7 @@ std::string ToString(ObservedFit fit) {
 }
 
 ObservedFit ObservedFitFromString(const std::string& text) {
-  for (ObservedFit fit : {ObservedFit::kGaussians, ObservedFit::kLogistic, ObservedFit::kIsotonic}) {
+  for (const ObservedFit fit : kObservedFits) {
     if (ToString(fit) == text) return fit;
   }
   throw std::invalid_argument("p(o|c) must be fitted by gaussians, logistic or isotonic, is \"" + text + "\"");

@@ -1,6 +1,7 @@
 // Observed detection success p(o|c): how likely a detection of confidence c is right (equations 9, 10).
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,7 @@ enum class ObservedFit {
   kLogistic,   // Log odds linear in c (Platt, 1999).
   kIsotonic    // Any rising curve (pooling adjacent violators).
 };
+inline constexpr std::array kObservedFits = {ObservedFit::kGaussians, ObservedFit::kLogistic, ObservedFit::kIsotonic};
 std::string ToString(ObservedFit fit);                       // "gaussians", "logistic", "isotonic".
 ObservedFit ObservedFitFromString(const std::string& text);  // Throws std::invalid_argument.
 

@@ -175,23 +175,32 @@ void AssessorNode::Step() {
   if (object != objects_.end() && !object->second.viewpoints.empty()) Publish(object->first, object->second);
 }
 
+std::map<std::string, AssessorNode::Object>::iterator AssessorNode::NextObject() {
+  auto unfinished = objects_.end();
+  for (auto object = objects_.begin(); object != objects_.end(); ++object) {
+    const Object& known = object->second;
+    if (known.views == 0 || now_us() < known.not_before_us) continue;
+    if (known.views > known.assessed_views) return object;
+    if (!known.finished && unfinished == objects_.end()) unfinished = object;
+  }
+  return unfinished;
+}
+
 void AssessorNode::StartNextJob() {
-  for (auto& [name, object] : objects_) {
-    const bool finished = object.finished && object.views <= object.assessed_views;
-    if (object.views == 0 || finished || now_us() < object.not_before_us) continue;
-    if (!std::filesystem::exists(params_.store)) {
-      NoteError("the learner has views of '" + name + "', but there is no store " + params_.store + ": give both the same --store");
-      object.not_before_us = now_us() + static_cast<std::int64_t>(params_.retry_period_s * 1e6);
-      continue;
-    }
-    auto received = frames_.Take();
-    worker_.Start(name, received ? std::optional<rgbd::Frame>(std::move(received->frame)) : std::nullopt);
-    if (params_.job_frames > 0) {
-      job_under_way_ = true;
-      job_effect_frame_ = frames_.frames() + params_.job_frames;
-      worker_.WaitUntilRead();  // The learner may write the next view at any time.
-    }
+  const auto next = NextObject();
+  if (next == objects_.end()) return;
+  auto& [name, object] = *next;
+  if (!std::filesystem::exists(params_.store)) {
+    NoteError("the learner has views of '" + name + "', but there is no store " + params_.store + ": give both the same --store");
+    object.not_before_us = now_us() + static_cast<std::int64_t>(params_.retry_period_s * 1e6);
     return;
+  }
+  auto received = frames_.Take();
+  worker_.Start(name, received ? std::optional<rgbd::Frame>(std::move(received->frame)) : std::nullopt);
+  if (params_.job_frames > 0) {
+    job_under_way_ = true;
+    job_effect_frame_ = frames_.frames() + params_.job_frames;
+    worker_.WaitUntilRead();  // The learner may write the next view at any time.
   }
 }
 

@@ -71,6 +71,8 @@ class AssessorNode : public messaging::Node {
   void OnReach(const reach_t& message);
   void OnQuery(const query_t& message);
   void OnAssessment(const Assessment& assessment);
+  // Whose trials go on: an object with views that have had none, so that these soon count; else one with unfinished ones.
+  std::map<std::string, Object>::iterator NextObject();
   void StartNextJob();
   // What came of the trials, once they take effect.
   std::optional<Assessment> TakeAssessment();

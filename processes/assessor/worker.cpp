@@ -140,10 +140,12 @@ Assessment Worker::Assess(const std::string& object, const std::optional<rgbd::F
       if (stop_) throw BrokenOff();
       progress_ = static_cast<double>(done) / of;
     };
-    ViewTrials& of_view = known.trials[next->id];
+    const auto begun = known.trials.find(next->id);
+    const int part = begun == known.trials.end() ? 0 : begun->second.parts;
     const auto trials = assessment::RunTrials(known.model->OnlyViews(first_views), first_views.back(), &backgrounds,
-                                              params_.recogniser, params_.trials, progress, {of_view.parts, kParts});
+                                              params_.recogniser, params_.trials, progress, {part, kParts});
     std::copy_n(backgrounds.begin(), backgrounds_.size(), backgrounds_.begin());  // With what was found out about them.
+    ViewTrials& of_view = known.trials[next->id];                                 // Only now: trials that threw are no trials.
     of_view.trials.insert(of_view.trials.end(), trials.begin(), trials.end());
     ++of_view.parts;
   }

@@ -55,14 +55,29 @@ double PriorOf(const Models& models) {
   return right / of;
 }
 
-ByFrame ObservedForecasts(const Models& models, double prior) {
+// p(o|c) of every hypothesis by the model's own measure, or by what `observed` makes of the model.
+template <typename Observed>
+ByFrame ObservedForecasts(const Models& models, double prior, const Observed& observed) {
   ByFrame by_frame;
   for (const JudgedModel* model : models) {
+    const measures::ObservedSuccess by = observed(*model);
     for (const auto& hypothesis : model->hypotheses) {
-      by_frame[hypothesis.frame].push_back({model->measures.observed.Probability(hypothesis.confidence, prior), hypothesis.right});
+      by_frame[hypothesis.frame].push_back({by.Probability(hypothesis.confidence, prior), hypothesis.right});
     }
   }
   return by_frame;
+}
+
+measures::ObservedSuccess OwnObserved(const JudgedModel& model) { return model.measures.observed; }
+
+// What the other fits would have made of the same virtual trials.
+Json FiguresOfFits(const Models& models, double prior, std::uint32_t seed) {
+  Json figures;
+  for (const measures::ObservedFit fit : measures::kObservedFits) {
+    const auto fitted = [fit](const JudgedModel& model) { return assessment::FitObserved(model.trials, fit); };
+    figures[measures::ToString(fit)] = ForecastFigures(ObservedForecasts(models, prior, fitted), seed);
+  }
+  return figures;
 }
 
 bool IsDetected(const JudgedModel& model, const assessment::ViewTrial& trial) {
@@ -107,13 +122,26 @@ Json CrossingFigures(const Models& models) {
   return {{"virtual_deg", learned}, {"real_deg", real}, {"difference_deg", learned - real}};
 }
 
-Json CompletenessFigures(const Models& models) {
+// By how much every look of every model was expected rather more than found; all models are judged on the same frames.
+std::vector<std::vector<double>> LookErrors(const Models& models, measures::CompletenessRule rule) {
+  std::vector<std::vector<double>> errors;
+  for (const JudgedModel* model : models) {
+    errors.emplace_back();
+    for (const auto& look : model->looks) {
+      errors.back().push_back(look.predicted.Value(rule, model->measures.predicted.common_cause()) - (look.detected ? 1.0 : 0.0));
+    }
+  }
+  return errors;
+}
+
+Json CompletenessFigures(const Models& models, std::uint32_t seed) {
   Json figures;
   figures["detection_rate"] = Mean(models, [](const JudgedModel& model) { return model.DetectionRate(); });
   for (const measures::CompletenessRule rule : measures::kCompletenessRules) {
     const auto difference = [rule](const JudgedModel& model) { return model.Completeness(rule) - model.DetectionRate(); };
     const double mean = Mean(models, difference);
     const double variance = Mean(models, [&](const JudgedModel& model) { return std::pow(difference(model) - mean, 2); });
+    const measures::Interval interval = measures::BootstrapMeanInterval(LookErrors(models, rule), 1000, 0.95, seed);
     std::vector<measures::Forecast> forecasts;
     for (const JudgedModel* model : models) {
       const double share = model->measures.predicted.common_cause();
@@ -122,6 +150,7 @@ Json CompletenessFigures(const Models& models) {
     figures[measures::ToString(rule)] = {
         {"predicted", Mean(models, [rule](const auto& model) { return model.Completeness(rule); })},
         {"difference", mean},
+        {"difference_95", {interval.lower, interval.upper}},
         {"difference_sd", std::sqrt(variance)},
         {"brier_score", measures::BrierScore(forecasts)}};
   }
@@ -131,11 +160,11 @@ Json CompletenessFigures(const Models& models) {
 Json FiguresOfModels(const Models& models, double prior, std::uint32_t seed) {
   Json figures;
   figures["models"] = models.size();
-  figures["observed"] = ForecastFigures(ObservedForecasts(models, prior), seed);
-  figures["observed_prior_half"] = ForecastFigures(ObservedForecasts(models, 0.5), seed);
+  figures["observed"] = ForecastFigures(ObservedForecasts(models, prior, OwnObserved), seed);
+  figures["observed_prior_half"] = ForecastFigures(ObservedForecasts(models, 0.5, OwnObserved), seed);
   figures["predicted"] = ForecastFigures(PredictedForecasts(models), seed);
   figures["crossing"] = CrossingFigures(models);
-  figures["completeness"] = CompletenessFigures(models);
+  figures["completeness"] = CompletenessFigures(models, seed);
   return figures;
 }
 
@@ -265,6 +294,8 @@ Json FiguresOf(const CalibrationTrial& trial, std::uint32_t seed) {
   figures["absent_frames"] = count([](const auto& frame) { return !frame.T_camera_mesh; });
   figures["prior"] = prior;
   figures["pooled"] = FiguresOfModels(all, prior, seed);
+  const bool drawn = std::none_of(all.begin(), all.end(), [](const JudgedModel* model) { return model->trials.empty(); });
+  if (drawn) figures["pooled"]["observed_by_fit"] = FiguresOfFits(all, prior, seed);
   figures["per_views"] = Json::array();
   for (const auto& [views, models] : by_views) {
     Json entry = {{"views", views}};
@@ -292,6 +323,12 @@ std::string TableOf(const Json& figures) {
   };
   forecasts("p(o|c), prior of the data", pooled["observed"]);
   forecasts("p(o|c), prior 1/2", pooled["observed_prior_half"]);
+  if (pooled.contains("observed_by_fit")) {
+    for (const measures::ObservedFit fit : measures::kObservedFits) {
+      const std::string name = measures::ToString(fit);
+      forecasts(("  data's prior, " + name).c_str(), pooled["observed_by_fit"][name]);
+    }
+  }
   forecasts("p(o|theta)", pooled["predicted"]);
   text +=
       "                                        halves at, deg             completeness - detected, Brier score of single looks\n";
@@ -300,7 +337,7 @@ std::string TableOf(const Json& figures) {
     std::snprintf(line, sizeof line, " %13s", measures::ToString(rule).c_str());
     text += line;
   }
-  text += '\n';
+  text += "   common_cause, 95 %\n";
   const auto row = [&](const std::string& name, const Json& of) {
     const Json& observed = of["observed"];
     const Json& completeness = of["completeness"];
@@ -314,7 +351,9 @@ std::string TableOf(const Json& figures) {
       std::snprintf(line, sizeof line, "  %+6.3f %.3f", by_rule["difference"].get<double>(), by_rule["brier_score"].get<double>());
       text += line;
     }
-    text += '\n';
+    const Json& interval = completeness[measures::ToString(measures::CompletenessRule::kCommonCause)]["difference_95"];
+    std::snprintf(line, sizeof line, "   %+.3f .. %+.3f\n", interval[0].get<double>(), interval[1].get<double>());
+    text += line;
   };
   for (const Json& entry : figures["per_views"]) row(std::to_string(entry["views"].get<int>()), entry);
   row("all", pooled);

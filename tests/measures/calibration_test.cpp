@@ -89,7 +89,39 @@ TEST(Bootstrap, IsAsWideAsTheSamplingErrorAndTheSameAgain) {
   EXPECT_EQ(BootstrapInterval(groups, BrierScore, 1000, 0.95, 5).lower, interval.lower);
 }
 
+TEST(Bootstrap, OfATableDrawsItsRowsAndItsColumns) {
+  // Rows that differ and columns that do not, and the other way round: either alone makes the mean uncertain by as much.
+  const std::vector<std::vector<double>> rows = {{0.0, 0.0}, {1.0, 1.0}}, columns = {{0.0, 1.0}, {0.0, 1.0}};
+  for (const auto& table : {rows, columns}) {
+    const Interval interval = BootstrapMeanInterval(table, 400, 0.95, 1);
+    EXPECT_EQ(interval.lower, 0.0);
+    EXPECT_EQ(interval.upper, 1.0);
+    const Interval middle = BootstrapMeanInterval(table, 400, 0.3, 1);
+    EXPECT_EQ(middle.lower, 0.5);
+    EXPECT_EQ(middle.upper, 0.5);
+  }
+}
+
+TEST(Bootstrap, OfATableKnowsThatColumnsErrTogether) {
+  // 10 models on the same 100 frames: where a frame errs for all, ten models are worth no more than one.
+  std::mt19937 random(3);
+  std::vector<std::vector<double>> together(10, std::vector<double>(100)), apart = together;
+  for (std::size_t frame = 0; frame < 100; ++frame) {
+    const double error = random() % 4 == 0;
+    for (std::size_t model = 0; model < 10; ++model) {
+      together[model][frame] = error;
+      apart[model][frame] = random() % 4 == 0;
+    }
+  }
+  const auto width = [](const Interval& interval) { return interval.upper - interval.lower; };
+  EXPECT_NEAR(width(BootstrapMeanInterval(together)), 3.92 * 0.0433, 0.03);
+  EXPECT_LT(width(BootstrapMeanInterval(apart)), 0.7 * width(BootstrapMeanInterval(together)));
+}
+
 TEST(Bootstrap, RefusesWhatMakesNoSense) {
+  EXPECT_EQ(BootstrapMeanInterval({}).upper, 0.0);
+  EXPECT_THROW(BootstrapMeanInterval({{1.0, 2.0}, {1.0}}), std::invalid_argument);
+  EXPECT_THROW(BootstrapMeanInterval({}, 0), std::invalid_argument);
   EXPECT_EQ(BootstrapInterval({}, BrierScore).upper, 0.0);
   EXPECT_THROW(BootstrapInterval({}, BrierScore, 0), std::invalid_argument);
   EXPECT_THROW(BootstrapInterval({}, BrierScore, 10, 1.0), std::invalid_argument);
