@@ -59,8 +59,8 @@ Hull ConvexHull(const std::vector<Eigen::Vector3d>& points, double min_thickness
       if (is_new) hull.vertices.push_back(solid[static_cast<std::size_t>(id)]);
       triangle.at(static_cast<std::size_t>(corner++)) = entry->second;
     }
-    // Qhull lists a facet's vertices in no particular sense; its top orientation says which of the two it is.
-    if (!facet.isTopOrient()) std::swap(triangle[1], triangle[2]);
+    // Qhull lists a facet's vertices by their number; its top orientation says that this runs clockwise seen from outside.
+    if (facet.isTopOrient()) std::swap(triangle[1], triangle[2]);
     hull.triangles.push_back(triangle);
   }
   return hull;
