@@ -43,6 +43,7 @@ struct Observation {
   std::string claim;
   std::string seen;
   bool agrees = false;
+  std::string why;  // What in the trials bears on it, as measured.
 };
 std::vector<Observation> Observe(const Report& report);
 
@@ -71,7 +72,7 @@ struct ErrorBin {
 };
 std::vector<ErrorBin> ErrorOverRotation(const ReportObject& object);
 std::vector<ErrorBin> ErrorOverRotation(const ReportTruth& truth);
-// Where a mean error passes a distance, degrees; nullopt where it does not.
-std::optional<double> PassesAt(const std::vector<ErrorBin>& bins, double error_m);
+// Where a mean (or median) error passes a distance, degrees; nullopt where it does not.
+std::optional<double> PassesAt(const std::vector<ErrorBin>& bins, double error_m, double ErrorBin::*error = &ErrorBin::mean_m);
 
 }  // namespace vantage::cli

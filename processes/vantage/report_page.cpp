@@ -13,6 +13,7 @@ namespace fs = std::filesystem;
 
 constexpr double kDegree = M_PI / 180.0;
 constexpr int kPanelPx = 360;
+constexpr int kPanelWithKeyPx = 480;  // Its key stands beside it.
 constexpr double kBinOfConfidence = 0.04;
 
 // A gnuplot script: data blocks, then plots.
@@ -37,9 +38,9 @@ class Script {
   }
 
   // An image of `panels` side by side; then a Panel() for each.
-  void Figure(const std::string& name, int panels) {
+  void Figure(const std::string& name, int panels, int panel_px = kPanelPx) {
     Close();
-    plots_ << "set terminal pngcairo size " << kPanelPx * panels << ',' << kPanelPx << "\nset output '" << name
+    plots_ << "set terminal pngcairo size " << panel_px * panels << ',' << kPanelPx << "\nset output '" << name
            << ".png'\nset multiplot layout 1," << panels << "\nset grid\nset key samplen 1 font ',8'\n";
     open_ = true;
   }
@@ -75,6 +76,8 @@ const std::string kOverConfidence =
     "set xrange [0:1]\nset yrange [0:1]\nset xlabel 'confidence c'\nset ylabel 'p(o|c)'\nset key bottom right";
 const std::string kOverRotation =
     "set xrange [0:90]\nset yrange [0:1]\nset xlabel 'rotation, degrees'\nset ylabel 'p(o|theta)'\nset key top right";
+
+const std::string kKeyBeside = "\nset key outside right center";
 
 std::string ObservedCurve(Script* script, const measures::ObservedSuccess& observed) {
   return script->Curve1(0.0, 1.0, 0.01, [&](double c) { return observed.Probability(c); });
@@ -188,12 +191,12 @@ void PlotLevels(const Report& report, const ReportObject& object, Script* script
     observed.push_back(ObservedCurve(script, real.observed) + " with lines lw 4 lc 'black' title 'real'");
     predicted.push_back(PredictedCurve(script, real.predicted) + " with lines lw 4 lc 'black' title 'real'");
   }
-  script->Figure("10_observed_virtual_and_real", 2);
-  script->Panel(object.name, kOverConfidence, observed);
-  script->Panel(object.name + ", enlarged", kOverConfidence + "\nset xrange [0:0.5]", observed);
-  script->Figure("12_predicted_virtual_and_real", 1);
+  script->Figure("10_observed_virtual_and_real", 2, kPanelWithKeyPx);
+  script->Panel(object.name, kOverConfidence + kKeyBeside, observed);
+  script->Panel(object.name + ", enlarged", kOverConfidence + kKeyBeside + "\nset xrange [0:0.5]", observed);
+  script->Figure("12_predicted_virtual_and_real", 1, kPanelWithKeyPx);
   predicted.emplace_back("0.5 with lines lc 'grey' notitle");
-  script->Panel(object.name, kOverRotation, predicted);
+  script->Panel(object.name, kOverRotation + kKeyBeside, predicted);
 }
 
 void PlotTogether(const Report& report, Script* script) {
@@ -205,12 +208,12 @@ void PlotTogether(const Report& report, Script* script) {
     errors.push_back(Errors(script, ErrorOverRotation(object)) + " using 1:2 with linespoints title " +
                      Script::Quoted(object.name) + " noenhanced");
   }
-  script->Figure("11_objects", 2);
-  script->Panel("p(o|c)", kOverConfidence, observed);
-  script->Panel("p(o|theta)", kOverRotation, predicted);
+  script->Figure("11_objects", 2, kPanelWithKeyPx);
+  script->Panel("p(o|c)", kOverConfidence + kKeyBeside, observed);
+  script->Panel("p(o|theta)", kOverRotation + kKeyBeside, predicted);
   const std::string axes =
-      "set xrange [0:60]\nset yrange [0:12]\nset xlabel 'rotation, degrees'\nset ylabel 'mean error, cm'\nset key top left";
-  script->Figure("13_pose_error", report.truth ? 2 : 1);
+      "set xrange [0:60]\nset yrange [0:12]\nset xlabel 'rotation, degrees'\nset ylabel 'mean error, cm'" + kKeyBeside;
+  script->Figure("13_pose_error", report.truth ? 2 : 1, kPanelWithKeyPx);
   errors.emplace_back("4 with lines lc 'grey' notitle");
   script->Panel("virtual", axes, errors);
   if (!report.truth) return;
@@ -255,10 +258,11 @@ std::string Escaped(const std::string& text) {
 
 std::string ObservationTable(const std::vector<Observation>& observations) {
   std::ostringstream html;
-  html << "<table><tr><th>object</th><th>the paper</th><th>here</th><th></th></tr>\n";
+  html << "<table><tr><th>object</th><th>the paper</th><th>here</th><th></th><th>what bears on it</th></tr>\n";
   for (const Observation& one : observations) {
     html << "<tr><td>" << Escaped(one.object.empty() ? "all" : one.object) << "</td><td>" << Escaped(one.claim) << "</td><td>"
-         << Escaped(one.seen) << "</td><td class=" << (one.agrees ? "yes>agrees" : "no>differs") << "</td></tr>\n";
+         << Escaped(one.seen) << "</td><td class=" << (one.agrees ? "yes>agrees" : "no>differs") << "</td><td>" << Escaped(one.why)
+         << "</td></tr>\n";
   }
   html << "</table>\n";
   return html.str();

@@ -446,6 +446,7 @@ TEST_F(Cli, AssessmentGoesOnWhereItWasStoppedAndPredicts) {
   EXPECT_NE(page.find("</html>"), std::string::npos);
   const Json observations = Json::parse(ReadFile(folder_ / "report.json"))["observations"];
   EXPECT_EQ(observations.size(), 11u);  // 6 of virtual images, 5 of photographs; one object alone cannot differ from others.
+  for (const Json& one : observations) EXPECT_FALSE(one["why"].get<std::string>().empty()) << one["claim"];
   EXPECT_EQ(Run(report + "2:6").err, "");
   ExpectRefused(report + "1:6", "vantage assess", {"learned from frame 1", "--frames"});
   EXPECT_EQ(ReadFile(folder_ / "s.db"), before);
