@@ -34,7 +34,7 @@ struct Report {
   std::vector<ReportObject> objects;
   std::optional<ReportTruth> truth;
   recognition::RecogniserParams recogniser;
-  measures::ObservedFit observed_fit = measures::ObservedFit::kGaussians;
+  measures::ObservedFit observed_fit = measures::ObservedFit::kLogistic;
 };
 
 // Something the paper saw, and whether we see it.
