@@ -78,7 +78,7 @@ void AddEvaluateCalibration(CLI::App& evaluate, Run& run) {
                               ->type_name("DIR");
   verb->add_option("--mesh", options->meshes,
                    "Instead: objects on a simulated table, one after another, each seen 96 times by a Kinect; half of the looks "
-                   "teach, half judge, and again with the object gone")
+                   "teach, half judge with the object carried elsewhere and turned, and again with it gone")
       ->delimiter(',')
       ->excludes(sequence)
       ->check(CLI::ExistingFile)

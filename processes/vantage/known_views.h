@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -51,7 +52,8 @@ class RecordedObject : public KnownFrames {
 };
 
 // The first object of a simulated world, seen from all sides at elevations of 15 to 75 degrees and three distances, with the
-// sensor's errors. Ids count from 0; even and odd ones each cover the sphere evenly.
+// sensor's errors. Ids count from 0; even and odd ones each cover the sphere evenly. Before odd looks it is carried elsewhere on
+// the table and turned: what lies about it must not help to find it again.
 class SimulatedObject : public KnownFrames {
  public:
   // Throws as SimulatedWorld does. Cost: about 0.2 s a frame on one core.
@@ -73,7 +75,7 @@ class SimulatedObject : public KnownFrames {
   std::vector<int> ids_;
   std::vector<rgbd::Frame> frames_;
   std::vector<cv::Mat> masks_;
-  geometry::Rigid T_world_mesh_ = geometry::Rigid::Identity();
+  std::array<geometry::Rigid, 2> T_world_mesh_;  // In even and in odd looks.
 };
 
 }  // namespace vantage::cli
