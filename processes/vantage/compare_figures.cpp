@@ -23,6 +23,7 @@ using Key = std::pair<std::string, int>;  // World and seed: what runs of differ
 struct Row {
   double time_s = kNever;       // To the wanted share of the best reachable completeness.
   double views = kNever;        // Learned until then.
+  double looks = kNever;        // Views gone to until then, whether they were learned or not.
   double rate_time_s = kNever;  // To a true detection rate of 0.85, or of 0.9 of the best where that is less.
   double error = 0.0;           // |completeness - true rate| at the stop.
 };
@@ -41,6 +42,14 @@ int ViewsUntil(const Json& curve, double wanted) {
     if (point[1].get<double>() >= wanted) return views;
   }
   return std::numeric_limits<int>::max();
+}
+
+// The first one is where the run begins.
+int LooksUntil(const Json& attempts, double time_s) {
+  constexpr double kRounding_s = 1e-6;
+  return 1 + static_cast<int>(std::count_if(attempts.begin(), attempts.end(), [&](const Json& attempt) {
+           return attempt["time_s"].get<double>() <= time_s + kRounding_s;
+         }));
 }
 
 // The greatest value of a curve that any run in a world came to.
@@ -138,7 +147,10 @@ CompareFigures Group(const std::vector<Json>& runs, const std::vector<std::strin
     const double wanted = kShareOfBest * best.at(world);
     Row row;
     row.time_s = FirstTime(run["completeness_over_time"], wanted);
-    if (std::isfinite(row.time_s)) row.views = ViewsUntil(run["completeness_over_time"], wanted);
+    if (std::isfinite(row.time_s)) {
+      row.views = ViewsUntil(run["completeness_over_time"], wanted);
+      row.looks = LooksUntil(run["attempts_made"], row.time_s);
+    }
     const auto most = best_rate.find(world);
     const double wanted_rate = most == best_rate.end() ? kWantedRate : std::min(kWantedRate, kShareOfBest * most->second);
     row.rate_time_s = FirstTime(run["true_rate_over_time"], wanted_rate);
@@ -156,8 +168,8 @@ CompareFigures Group(const std::vector<Json>& runs, const std::vector<std::strin
         << " runs; medians with 90 % intervals; ratios are planner / strategy, paired by world and seed\n";
   std::string head = "  strategy";
   const std::vector<std::pair<std::string, std::size_t>> columns{
-      {"runs", 12},  {"s to 0.9 of best", 18}, {"ratio", 44},  {"views", 66},
-      {"ratio", 74}, {"s to rate 0.85", 94},   {"ratio", 120}, {"|error|", 142}};
+      {"runs", 12},  {"s to 0.9 of best", 18}, {"ratio", 44},  {"views", 64},   {"ratio", 71}, {"looks", 90},
+      {"ratio", 97}, {"s to rate 0.85", 116},  {"ratio", 142}, {"|error|", 162}};
   for (const auto& [title, column] : columns) {
     Pad(head, column);
     head += title;
@@ -173,7 +185,9 @@ CompareFigures Group(const std::vector<Json>& runs, const std::vector<std::strin
     const Interval view_ratio = MedianInterval(Ratios(ours, theirs, &Row::views));
     const Interval rate_time = MedianInterval(Values(theirs, &Row::rate_time_s));
     const Interval rate_ratio = MedianInterval(Ratios(ours, theirs, &Row::rate_time_s));
-    const double views = Median(Values(theirs, &Row::views)), error = Median(Values(theirs, &Row::error));
+    const Interval look_ratio = MedianInterval(Ratios(ours, theirs, &Row::looks));
+    const double views = Median(Values(theirs, &Row::views)), looks = Median(Values(theirs, &Row::looks));
+    const double error = Median(Values(theirs, &Row::error));
     const auto unless = [](bool unused, const std::string& text) { return unused ? std::string() : text; };
     const bool is_planner = strategy == "planner";
     const bool is_oracle = strategy == "oracle";  // It works for the true rate and knows of no completeness.
@@ -182,6 +196,8 @@ CompareFigures Group(const std::vector<Json>& runs, const std::vector<std::strin
                                          unless(is_planner || is_oracle, Text(time_ratio, 2)),
                                          unless(is_oracle, Text(views, 0)),
                                          unless(is_planner || is_oracle, Text(view_ratio, 2)),
+                                         unless(is_oracle, Text(looks, 0)),
+                                         unless(is_planner || is_oracle, Text(look_ratio, 2)),
                                          Text(rate_time, 1),
                                          unless(is_planner, Text(rate_ratio, 2)),
                                          Text(error, 3)};
@@ -198,6 +214,8 @@ CompareFigures Group(const std::vector<Json>& runs, const std::vector<std::strin
                          {"planner_time_ratio", ToJson(time_ratio)},
                          {"views", Number(views)},
                          {"planner_views_ratio", ToJson(view_ratio)},
+                         {"looks", Number(looks)},
+                         {"planner_looks_ratio", ToJson(look_ratio)},
                          {"time_to_rate_s", ToJson(rate_time)},
                          {"planner_time_to_rate_ratio", ToJson(rate_ratio)},
                          {"completeness_error", Number(error)},

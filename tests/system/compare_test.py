@@ -30,6 +30,7 @@ with tempfile.TemporaryDirectory() as name:
     assert group["touching"] == 0 and group["paths"] >= 12, group
     for figures in group["strategies"].values():
         assert figures["runs"] == 1 and sum(figures["stopped"].values()) == 1, figures
+        assert figures["looks"] is None or figures["looks"] >= figures["views"], figures
     assert "planner / strategy" in (folder / "table.txt").read_text()
 
     other = compare(folder, "--judge-views", "3")
