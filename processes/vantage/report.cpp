@@ -140,8 +140,7 @@ void ObserveObject(const Report& report, const ReportObject& object, std::vector
   const double halfway_deg = object.measures.predicted.HalfwayRotation() / kDegree;
   note("One view is detected half of the time at about 22 degrees", Text("at %.1f degrees", halfway_deg),
        std::abs(halfway_deg - 22.0) <= 5.0,
-       Text("at %.1f degrees in images with little noise and blur: half of all levels are worse than a camera's",
-            clear.predicted.HalfwayRotation() / kDegree));
+       Text("at %.1f degrees in images with little noise and blur", clear.predicted.HalfwayRotation() / kDegree));
   const auto bins = ErrorOverRotation(object);
   const auto passes = PassesAt(bins, 0.04);
   note("The mean pose error passes 4 cm at about 20 degrees",

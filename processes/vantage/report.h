@@ -43,7 +43,7 @@ struct Observation {
   std::string claim;
   std::string seen;
   bool agrees = false;
-  std::string why;  // What in the trials bears on it, as measured.
+  std::string why;  // What bears on it, as measured in the trials where it can be.
 };
 std::vector<Observation> Observe(const Report& report);
 
