@@ -103,7 +103,7 @@ Share ClearAmongFaint(const std::vector<assessment::Trial>& trials, const std::v
 // Where the median error passes the distance that the mean passes as soon as a few poses are quite wrong.
 std::string MedianPassesAt(const std::vector<ErrorBin>& bins) {
   const auto median = PassesAt(bins, 0.04, &ErrorBin::median_m);
-  return median ? Text("the median passes it at %.1f degrees", *median) : "nor does the median: what is proposed is mostly right";
+  return median ? Text("the median passes it at %.1f degrees", *median) : "the median does not";
 }
 
 // Of proposals with all views on offer, those that change sides between 2 and 6 cm.
@@ -135,7 +135,8 @@ void ObserveObject(const Report& report, const ReportObject& object, std::vector
   note("Confidences under 0.1 tend to be false",
        Text("p(o|c = 0.1) = %.2f; %.0f of %.0f proposals below 0.1 right", p_unsure, unsure.right, unsure.of),
        unsure.of > 0 ? unsure.value() < 0.5 : p_unsure < 0.5,
-       Text("wrong ones reach %.2f on average; of the right ones below 0.1 %.0f of %.0f are much blurred or noisy",
+       Text("wrong ones reach %.2f on average; of the right ones below 0.1 %.0f of %.0f are in images with more than little noise "
+            "or blur",
             observed.negative().mean, faint.of - faint.right, faint.of));
   const double halfway_deg = object.measures.predicted.HalfwayRotation() / kDegree;
   note("One view is detected half of the time at about 22 degrees", Text("at %.1f degrees", halfway_deg),
@@ -222,8 +223,7 @@ void ObserveTruth(const Report& report, const ReportObject& object, std::vector<
   const double real_deg = real.predicted.HalfwayRotation() / kDegree;
   note("Virtual and real p(o|theta) intersect where they fall to one half",
        Text("virtual at %.1f, real at %.1f degrees", virtual_deg, real_deg), std::abs(virtual_deg - real_deg) <= 3.0,
-       Text("virtual at %.1f degrees with little noise and blur, as these photographs have",
-            clear.predicted.HalfwayRotation() / kDegree));
+       Text("virtual at %.1f degrees with little noise and blur", clear.predicted.HalfwayRotation() / kDegree));
   const auto bins = ErrorOverRotation(*report.truth);
   const auto passes = PassesAt(bins, 0.04);
   note("The mean pose error passes 4 cm at about 20 degrees",
