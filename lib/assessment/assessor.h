@@ -14,19 +14,20 @@
 namespace vantage::assessment {
 
 struct TrialParams {
-  int trials_per_view = 40;        // Virtual images per learned view, each offering only that view; >= 1.
-  int negatives_per_view = 12;     // Images without the object, each another background as long as there are; >= 0.
-  double max_rotation_deg = 60.0;  // Out of plane, uniform in 0..max; (0, 90].
-  double min_elevation_deg = 0.0;  // No camera is lower (object z up): below is the table; [-90, 90).
-  double max_scale_octaves = 1.0;  // Distances +-max about the views' median, mostly near it: 1 = 0.5..2 times; >= 0.
-  double max_image_noise = 16.0;   // Sigma, grey levels: 8 even levels from 0; >= 0.
-  double max_blur_px = 1.6;        // Sigma, likewise; >= 0.
-  double level_ratio = 0.25;       // Every level is so much rarer than the one below; (0, 1], 1 = all alike.
-  double max_brightness = 0.25;    // Relative change of brightness, and of gamma; [0, 1).
-  double max_occlusion = 0.0;      // Something hides up to this share of the object's box; [0, 1).
-  double correct_m = 0.04;         // Mean point distance below which a detection is right; > 0.
-  int image_width = 320;           // Virtual images are crops around the object, as tight as they can be but
-  int image_height = 240;          // never larger than twice this, close objects included; >= 64.
+  int trials_per_view = 40;         // Virtual images per learned view, each offering only that view; >= 1.
+  int negatives_per_view = 12;      // Images without the object, each another background as long as there are; >= 0.
+  double max_rotation_deg = 85.0;   // Out of plane, uniform in 0..max; (0, 90].
+  double min_elevation_deg = 10.0;  // No camera is lower (object z up): below is the table; [-90, 90).
+  double max_scale_octaves = 1.0;   // Distances +-max about the views' median, mostly near it: 1 = 0.5..2 times; >= 0.
+  double max_image_noise = 16.0;    // Sigma, grey levels: 8 even levels from 0; >= 0.
+  double max_blur_px = 1.6;         // Sigma, likewise; >= 0.
+  double level_ratio = 0.25;        // Every level is so much rarer than the one below; (0, 1], 1 = all alike.
+  double max_brightness = 0.25;     // Relative change of brightness, and of gamma; [0, 1).
+  double lamp_share = 0.0;          // So much of the light is from a lamp: on an object met again, from another side; [0, 1).
+  double max_occlusion = 0.0;       // Something hides up to this share of the object's box; [0, 1).
+  double correct_m = 0.04;          // Mean point distance below which a detection is right; > 0.
+  int image_width = 320;            // Virtual images are crops around the object, as tight as they can be but
+  int image_height = 240;           // never larger than twice this, close objects included; >= 64.
   measures::ObservedFit observed_fit = measures::ObservedFit::kLogistic;  // How p(o|c) is made of the confidences.
   std::uint32_t seed = 0;
 

@@ -65,9 +65,21 @@ VirtualImage RenderSharply(const VirtualObject& object, const geometry::PinholeC
   const cv::Size size(camera.width, camera.height);
   cv::resize(image.color, image.color, size, 0, 0, cv::INTER_AREA);
   cv::resize(image.mask, image.mask, size, 0, 0, cv::INTER_AREA);
+  cv::resize(image.normals, image.normals, size, 0, 0, cv::INTER_AREA);
   image.mask = image.mask == 255;
   image.color.setTo(cv::Scalar::all(0), image.mask == 0);
   return image;
+}
+
+// The light on an object that is carried about and turned: a lamp somewhere above it comes from another side.
+void TurnUnderLamp(double lamp_share, Dice* dice, VirtualImage* image) {
+  const double z = dice->Uniform(0.0, 1.0);
+  const auto lamp = [&](double azimuth) {
+    const double across = std::sqrt(1.0 - z * z);
+    return Light{1.0 - lamp_share, {across * std::cos(azimuth), across * std::sin(azimuth), z}};
+  };
+  const Light before = lamp(dice->Uniform(-M_PI, M_PI));
+  Relight(before, lamp(dice->Uniform(-M_PI, M_PI)), image);
 }
 
 // Puts the background back over a share of the box, from one of its sides: something stands before it.
@@ -125,7 +137,8 @@ class TrialRunner {
     // A close object may be twice the size.
     frame.camera = surface_.Window(view_, T_camera_object, 2 * params_.image_width, 2 * params_.image_height);
     const cv::Mat window = Window(frame.camera, &dice);
-    const VirtualImage shown = RenderSharply(surface_, frame.camera, T_camera_object, pose.log2_scale < 0.0);
+    VirtualImage shown = RenderSharply(surface_, frame.camera, T_camera_object, pose.log2_scale < 0.0);
+    if (params_.lamp_share > 0.0) TurnUnderLamp(params_.lamp_share, &dice, &shown);
     frame.color = Paste(shown, window);
     if (params_.max_occlusion > 0.0) {
       Hide(dice.Uniform(0.0, params_.max_occlusion), cv::boundingRect(shown.mask), window, &dice, &frame.color);
@@ -268,6 +281,7 @@ void TrialParams::Check() const {
   require(max_image_noise >= 0.0, "max_image_noise must be >= 0");
   require(max_blur_px >= 0.0, "max_blur_px must be >= 0");
   require(level_ratio > 0.0 && level_ratio <= 1.0, "level_ratio must be in (0, 1]");
+  require(lamp_share >= 0.0 && lamp_share < 1.0, "lamp_share must be in [0, 1)");
   require(max_occlusion >= 0.0 && max_occlusion < 1.0, "max_occlusion must be in [0, 1)");
   require(max_brightness >= 0.0 && max_brightness < 1.0, "max_brightness must be in [0, 1)");
   require(correct_m > 0.0, "correct_m must be > 0");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <stdexcept>
 
 #include "geometry/rigid.h"
@@ -20,26 +21,36 @@ constexpr double kMinSourceCosine = 0.17;  // Surface the keyframe saw at more t
 constexpr double kMinCosine = 0.05;        // Likewise for the virtual camera.
 
 // The depth (CV_16UC1) with pixels of the mask that have none at the mean of those around them that do: depth registered to the
-// colours of a near object has holes all over.
+// colours of a near object has holes all over, and none along the object's outline.
 cv::Mat WithoutHoles(const cv::Mat& depth, const cv::Mat& mask) {
   constexpr int kReach = 9;          // Pixels.
   constexpr double kMinKnown = 0.1;  // Of the pixels within reach.
-  cv::Mat known, sum, share;
-  cv::Mat((depth > 0) & (mask > 0)).convertTo(known, CV_32F, 1.0 / 255.0);
-  depth.convertTo(sum, CV_32F);
-  cv::blur(sum.mul(known), sum, {kReach, kReach});
-  cv::blur(known, share, {kReach, kReach});
-  cv::Mat mean, filled = depth.clone();
-  cv::Mat(sum / share).convertTo(mean, CV_16U);
-  mean.copyTo(filled, (depth == 0) & (mask > 0) & (share >= kMinKnown));
+  constexpr int kPasses = 3;
+  cv::Mat filled = depth.clone();
+  for (int pass = 0; pass < kPasses; ++pass) {
+    cv::Mat known, sum, share, mean;
+    cv::Mat((filled > 0) & (mask > 0)).convertTo(known, CV_32F, 1.0 / 255.0);
+    filled.convertTo(sum, CV_32F);
+    cv::blur(sum.mul(known), sum, {kReach, kReach});
+    cv::blur(known, share, {kReach, kReach});
+    cv::Mat(sum / share).convertTo(mean, CV_16U);
+    mean.copyTo(filled, (filled == 0) & (mask > 0) & (share >= kMinKnown));
+  }
   return filled;
 }
 
-// Unit normals of the keyframe's depth, camera coordinates, facing the camera; zero where unknown. CV_32FC3.
-cv::Mat NormalMap(const rgbd::Frame& frame, const cv::Mat& mask) {
+// The mean of what is known (CV_32F, 0 or 1) of `values` (CV_32FC3, zero elsewhere) around every pixel.
+cv::Mat MeanOfKnown(const cv::Mat& values, const cv::Mat& known, int reach) {
+  cv::Mat sum, share;
+  cv::blur(values, sum, {reach, reach});
+  cv::blur(known, share, {reach, reach});
+  cv::merge(std::vector<cv::Mat>(3, cv::max(share, 1e-6)), share);
+  return sum / share;
+}
+
+// Unit normals of the keyframe's depth (without holes), camera coordinates, facing the camera; zero where unknown. CV_32FC3.
+cv::Mat NormalMap(const rgbd::Frame& whole, const cv::Mat& mask) {
   const int step = 3;  // Pixels to either side: depth is quantised.
-  rgbd::Frame whole = frame;
-  whole.depth = WithoutHoles(frame.depth, mask);
   const cv::Mat cloud = rgbd::OrganisedCloud(whole);
   cv::Mat normals(cloud.size(), CV_32FC3, cv::Scalar::all(0));
   const auto inside = [&](int x, int y) {
@@ -64,6 +75,40 @@ cv::Mat NormalMap(const rgbd::Frame& frame, const cv::Mat& mask) {
   return normals;
 }
 
+// The normals as light is to fall on them: without the depth's noise. Object coordinates, about unit length; zero off the mask.
+cv::Mat SmoothNormals(const cv::Mat& normals, const cv::Mat& mask, const Eigen::Matrix3d& R_object_camera) {
+  constexpr int kReach = 13;  // Pixels.
+  cv::Mat known, smooth;
+  mask.convertTo(known, CV_32F, 1.0 / 255.0);
+  smooth = MeanOfKnown(MeanOfKnown(normals, known, kReach), cv::Mat::ones(mask.size(), CV_32F), kReach);
+  const Eigen::Matrix3f R = R_object_camera.cast<float>();
+  for (int y = 0; y < mask.rows; ++y) {
+    for (int x = 0; x < mask.cols; ++x) {
+      cv::Vec3f& n = smooth.at<cv::Vec3f>(y, x);
+      const Eigen::Vector3f turned = R * Eigen::Vector3f(n[0], n[1], n[2]);
+      const float norm = turned.norm();
+      n = mask.at<std::uint8_t>(y, x) && norm > 0.f ? cv::Vec3f(turned.x(), turned.y(), turned.z()) / norm : cv::Vec3f::all(0);
+    }
+  }
+  return smooth;
+}
+
+// Gaps of a few pixels, where no keyframe saw the surface well, get the mean of what is around them: what is behind the object
+// would shine through.
+void CloseGaps(VirtualImage* image) {
+  constexpr int kReach = 7;  // Pixels.
+  cv::Mat closed;
+  cv::morphologyEx(image->mask, closed, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {kReach, kReach}));
+  const cv::Mat gaps = closed & ~image->mask;
+  cv::Mat known, colors, mean;
+  image->mask.convertTo(known, CV_32F, 1.0 / 255.0);
+  image->color.convertTo(colors, CV_32FC3);
+  MeanOfKnown(colors, known, kReach).convertTo(mean, CV_8UC3);
+  mean.copyTo(image->color, gaps);
+  MeanOfKnown(image->normals, known, kReach).copyTo(image->normals, gaps);
+  image->mask |= gaps;
+}
+
 int MeshStep(const cv::Mat& mask) {
   return std::max(1, static_cast<int>(std::ceil(std::sqrt(cv::countNonZero(mask) / static_cast<double>(kMaxMeshVertices)))));
 }
@@ -72,20 +117,23 @@ int MeshStep(const cv::Mat& mask) {
 
 struct VirtualObject::Surface {
   rendering::Scene scene;  // Object coordinates.
-  cv::Mat normals;
+  cv::Mat normals;         // Keyframe's camera.
+  cv::Mat smooth_normals;  // Object coordinates.
   const model::View* view = nullptr;
 
-  // Whether the keyframe saw the surface at this point well, and a camera at that place sees the same side of it.
-  bool ShowsOutside(const Eigen::Vector3d& point_in_object, const Eigen::Vector3d& camera_in_object) const {
+  // The keyframe's pixel that shows this point, if it saw the surface there well and a camera at that place sees the same side of
+  // it.
+  std::optional<cv::Point> Shows(const Eigen::Vector3d& point_in_object, const Eigen::Vector3d& camera_in_object) const {
     const Eigen::Vector3d point = view->T_camera_object * point_in_object;
-    const auto pixel = view->keyframe.camera.Project(point);
-    if (!pixel) return false;
-    const int x = static_cast<int>(std::lround(pixel->x())), y = static_cast<int>(std::lround(pixel->y()));
-    if (x < 0 || y < 0 || x >= normals.cols || y >= normals.rows) return false;
-    const cv::Vec3f& n = normals.at<cv::Vec3f>(y, x);
+    const auto projected = view->keyframe.camera.Project(point);
+    if (!projected) return std::nullopt;
+    const cv::Point pixel(static_cast<int>(std::lround(projected->x())), static_cast<int>(std::lround(projected->y())));
+    if (!cv::Rect({0, 0}, normals.size()).contains(pixel)) return std::nullopt;
+    const cv::Vec3f& n = normals.at<cv::Vec3f>(pixel);
     const Eigen::Vector3d normal(n[0], n[1], n[2]);
-    if (-normal.dot(point.normalized()) < kMinSourceCosine) return false;
-    return normal.dot((view->T_camera_object * camera_in_object - point).normalized()) > kMinCosine;
+    if (-normal.dot(point.normalized()) < kMinSourceCosine) return std::nullopt;
+    if (normal.dot((view->T_camera_object * camera_in_object - point).normalized()) <= kMinCosine) return std::nullopt;
+    return pixel;
   }
 };
 
@@ -107,16 +155,17 @@ VirtualObject::VirtualObject(const model::ObjectModel& object) : object_(object)
   for (const model::View& view : object.views) {
     surfaces_.push_back(nullptr);
     if (view.keyframe.depth.empty() || view.mask.empty()) continue;
-    cv::Mat inner;  // Without the rim, whose colours are half background.
-    cv::erode(view.mask, inner, cv::Mat(), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(255));
+    rgbd::Frame whole = view.keyframe;
+    whole.depth = WithoutHoles(whole.depth, view.mask);
     auto mesh = std::make_shared<rendering::Mesh>(
-        rendering::MeshFromFrame(view.keyframe, inner, view.T_camera_object.inverse(), MeshStep(inner)));
+        rendering::MeshFromFrame(whole, view.mask, view.T_camera_object.inverse(), MeshStep(view.mask)));
     if (mesh->triangles.empty()) continue;
     const std::size_t stride = std::max<std::size_t>(1, mesh->vertices.size() / 200);
     for (std::size_t i = 0; i < mesh->vertices.size(); i += stride) outline.push_back(mesh->vertices[i].cast<double>());
     auto surface = std::make_unique<Surface>();
     surface->scene.Add(std::move(mesh), geometry::Rigid::Identity());
-    surface->normals = NormalMap(view.keyframe, view.mask);
+    surface->normals = NormalMap(whole, view.mask);
+    surface->smooth_normals = SmoothNormals(surface->normals, view.mask, view.T_camera_object.linear().transpose());
     surface->view = &view;
     surfaces_.back() = std::move(surface);
   }
@@ -166,7 +215,8 @@ VirtualImage VirtualObject::Render(const geometry::PinholeCamera& camera, const 
   rendering::RenderParams params;
   params.shaded = false;
   VirtualImage result{cv::Mat(camera.height, camera.width, CV_8UC3, cv::Scalar::all(0)),
-                      cv::Mat(camera.height, camera.width, CV_8UC1, cv::Scalar(0))};
+                      cv::Mat(camera.height, camera.width, CV_8UC1, cv::Scalar(0)),
+                      cv::Mat(camera.height, camera.width, CV_32FC3, cv::Scalar::all(0))};
   cv::Mat depth(camera.height, camera.width, CV_32FC1, cv::Scalar(1e9));
   int shown = 0;
   for (const auto& [angle, i] : order) {
@@ -178,8 +228,10 @@ VirtualImage VirtualObject::Render(const geometry::PinholeCamera& camera, const 
         const float z = image.depth.at<float>(y, x);
         if (!(z > 0.f) || z > depth.at<float>(y, x) - kInFrontM) continue;
         const Eigen::Vector3d point = T_object_camera * camera.Unproject({x, y}, z);
-        if (!surface.ShowsOutside(point, T_object_camera.translation())) continue;
+        const auto source = surface.Shows(point, T_object_camera.translation());
+        if (!source) continue;
         depth.at<float>(y, x) = z;
+        result.normals.at<cv::Vec3f>(y, x) = surface.smooth_normals.at<cv::Vec3f>(*source);
         result.color.at<cv::Vec3b>(y, x) = image.color.at<cv::Vec3b>(y, x);
         result.mask.at<std::uint8_t>(y, x) = 255;
         ++added;
@@ -188,17 +240,32 @@ VirtualImage VirtualObject::Render(const geometry::PinholeCamera& camera, const 
     shown += added;
     if (added > 0 && added < kWorthwhileShare * shown) break;  // The next ones are farther off and would add less.
   }
+  CloseGaps(&result);
   return result;
+}
+
+void Relight(const Light& before, const Light& after, VirtualImage* image) {
+  const auto falls = [](const Light& light, const Eigen::Vector3d& normal) {
+    return light.ambient + (1.0 - light.ambient) * std::max(0.0, light.to_lamp.dot(normal));
+  };
+  for (int y = 0; y < image->color.rows; ++y) {
+    for (int x = 0; x < image->color.cols; ++x) {
+      const cv::Vec3f& n = image->normals.at<cv::Vec3f>(y, x);
+      if (!image->mask.at<std::uint8_t>(y, x) || n == cv::Vec3f::all(0)) continue;
+      const Eigen::Vector3d normal(n[0], n[1], n[2]);
+      const double ratio = falls(after, normal) / std::max(1e-3, falls(before, normal));
+      cv::Vec3b& pixel = image->color.at<cv::Vec3b>(y, x);
+      for (int k = 0; k < 3; ++k) pixel[k] = cv::saturate_cast<std::uint8_t>(ratio * pixel[k]);
+    }
+  }
 }
 
 cv::Mat Paste(const VirtualImage& object, const cv::Mat& background) {
   if (background.cols < object.color.cols || background.rows < object.color.rows || background.type() != CV_8UC3) {
     throw std::invalid_argument("Paste: the background must be CV_8UC3 and at least as large as the object's image");
   }
-  // The outermost pixels of the mesh are mixed with the background already; the ramp lies inside of them.
   cv::Mat alpha;
-  cv::erode(object.mask, alpha, cv::Mat(), cv::Point(-1, -1), 1, cv::BORDER_REPLICATE);
-  cv::GaussianBlur(alpha, alpha, cv::Size(3, 3), 0.7);
+  cv::GaussianBlur(object.mask, alpha, cv::Size(3, 3), 0.7);
   cv::Mat image = background(cv::Rect(0, 0, object.color.cols, object.color.rows)).clone();
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {

@@ -22,8 +22,15 @@ struct VirtualPose {
 geometry::Rigid VirtualCameraPose(const model::View& view, const VirtualPose& pose);
 
 struct VirtualImage {
-  cv::Mat color;  // CV_8UC3 BGR; black where `mask` is 0.
-  cv::Mat mask;   // CV_8UC1, 255 where the object's known surface is seen.
+  cv::Mat color;    // CV_8UC3 BGR; black where `mask` is 0.
+  cv::Mat mask;     // CV_8UC1, 255 where the object's known surface is seen.
+  cv::Mat normals;  // CV_32FC3, outward, object coordinates, about unit length; zero where unknown.
+};
+
+// What falls on an object: light from everywhere and from one lamp.
+struct Light {
+  double ambient = 1.0;                                // Share of the light that comes from everywhere, [0, 1].
+  Eigen::Vector3d to_lamp = Eigen::Vector3d::UnitZ();  // Unit, object coordinates.
 };
 
 // The known surface of an object. Built once per model; rendering is const.
@@ -37,9 +44,10 @@ class VirtualObject {
   // max_width x max_height. Where the object is not in front of the camera, the largest window.
   geometry::PinholeCamera Window(int view, const geometry::Rigid& T_camera_object, int max_width, int max_height) const;
 
-  // The known surface as the keyframe nearest in direction to the camera saw it; what that one did not see is filled in from the
-  // next ones. So a view is tried on photographs that are not its own wherever there are others. Where nothing is known there is a
-  // hole. Surfaces seen from behind are not shown. Cost: 10 ms per keyframe used (at most 4) for 320 x 320.
+  // The known surface (with small gaps in it closed) as the keyframe nearest in direction to the camera saw it; what that one did
+  // not see is filled in from the next ones. So a view is tried on photographs that are not its own wherever there are others.
+  // Where nothing is known there is a hole. Surfaces seen from behind are not shown. Cost: 10 ms per keyframe used (at most 4) for
+  // 320 x 320.
   VirtualImage Render(const geometry::PinholeCamera& camera, const geometry::Rigid& T_camera_object) const;
 
  private:
@@ -56,6 +64,10 @@ struct Disturbance {
   double blur_px = 0.0;      // Sigma; >= 0.
   double image_noise = 0.0;  // Sigma, grey levels; >= 0.
 };
+
+// A keyframe's colours hold the light they were taken in. This is what is seen when it changes, the surface being matt: every
+// pixel's brightness changes by the ratio of what falls on it. In place.
+void Relight(const Light& before, const Light& after, VirtualImage* image);
 
 // The object over the background (at least as large; its top left part is used), its outline softened as a lens would.
 cv::Mat Paste(const VirtualImage& object, const cv::Mat& background);

@@ -225,6 +225,7 @@ void Fields(Visitor& visit, assessment::TrialParams& params) {
   visit("max_blur_px", params.max_blur_px);
   visit("level_ratio", params.level_ratio);
   visit("max_brightness", params.max_brightness);
+  visit("lamp_share", params.lamp_share);
   visit("max_occlusion", params.max_occlusion);
   visit("correct_m", params.correct_m);
   visit("image_width", params.image_width);

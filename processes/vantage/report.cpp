@@ -145,7 +145,7 @@ void ObserveObject(const Report& report, const ReportObject& object, std::vector
   const auto bins = ErrorOverRotation(object);
   const auto passes = PassesAt(bins, 0.04);
   note("The mean pose error passes 4 cm at about 20 degrees",
-       passes ? Text("at %.1f degrees (virtual)", *passes) : "it does not up to 60 degrees (virtual)",
+       passes ? Text("at %.1f degrees (virtual)", *passes) : "it does not where it was tried (virtual)",
        passes && std::abs(*passes - 20.0) <= 5.0, MedianPassesAt(bins));
   const double least = MeanRightConfidence(object.trials, levels.front());
   const double most = MeanRightConfidence(object.trials, levels.back());

@@ -131,6 +131,22 @@ TEST_F(BoardTrials, WhatIsHiddenIsFoundLessOften) {
   EXPECT_LT(right(), 0.9 * static_cast<double>(whole));
 }
 
+TEST_F(BoardTrials, InOtherLightItIsFoundLessSurely) {
+  TrialParams params;
+  params.trials_per_view = 24;
+  params.negatives_per_view = 0;
+  params.max_rotation_deg = 25.0;
+  const auto confidence = [&](double lamp_share) {
+    params.lamp_share = lamp_share;
+    double sum = 0.0;
+    for (const Trial& trial : RunTrials(object_, 2, &backgrounds_, recogniser_, params)) sum += trial.confidence();
+    return sum;
+  };
+  const double as_learned = confidence(0.0);
+  EXPECT_GT(confidence(0.01), 0.95 * as_learned);
+  EXPECT_LT(confidence(0.95), 0.85 * as_learned);
+}
+
 TEST_F(BoardTrials, ALookAlikeIsOneMoreNegative) {
   const cv::Mat plain = backgrounds_[0].color;
   const cv::Mat with = WithLookAlike(plain, object_, 3);

@@ -99,6 +99,50 @@ TEST(VirtualObject, DepthThatIsHalfHolesShowsNearlyAllOfIt) {
   EXPECT_GT(with_holes, 0.8 * whole);
 }
 
+TEST(VirtualObject, TheRimThatHasNoDepthIsShown) {
+  model::ObjectModel object = FlatObject();
+  const model::View& view = object.views[0];
+  cv::Mat inner;
+  cv::erode(view.mask, inner, cv::Mat(), cv::Point(-1, -1), 4);
+  object.views[0].keyframe.depth.setTo(0, inner == 0);
+  const VirtualImage image = VirtualObject(object).Render(view.keyframe.camera, view.T_camera_object);
+  EXPECT_GT(cv::countNonZero(image.mask), 0.97 * cv::countNonZero(view.mask));
+  EXPECT_EQ(cv::countNonZero(image.mask & ~view.mask), 0);
+}
+
+TEST(VirtualObject, WhatIsBehindDoesNotShineThroughNarrowGaps) {
+  model::ObjectModel object = FlatObject();
+  model::View& view = object.views[0];
+  const int x = static_cast<int>(view.keyframe.camera.Project(view.T_camera_object.translation())->x());
+  const auto shown = [&] { return VirtualObject(object).Render(view.keyframe.camera, view.T_camera_object).mask; };
+  const cv::Mat whole = shown();
+  view.mask.colRange(x, x + 4).setTo(0);
+  EXPECT_GT(cv::countNonZero(shown()), 0.99 * cv::countNonZero(whole));
+  view.mask.colRange(x, x + 20).setTo(0);
+  EXPECT_LT(cv::countNonZero(shown()), 0.95 * cv::countNonZero(whole));
+}
+
+TEST(Relight, BrightnessFollowsWhatFallsOnTheSurface) {
+  const model::ObjectModel object = FlatObject();  // It faces -z.
+  const VirtualImage seen = VirtualObject(object).Render(object.views[0].keyframe.camera, object.views[0].T_camera_object);
+  cv::Mat inner;
+  cv::erode(seen.mask, inner, cv::Mat(), cv::Point(-1, -1), 4);
+  const auto brightness = [&](const Light& before, const Light& after) {
+    VirtualImage image = seen;
+    image.color = cv::Mat(seen.color.size(), CV_8UC3, cv::Scalar::all(100));
+    Relight(before, after, &image);
+    EXPECT_EQ(image.color.at<cv::Vec3b>(0, 0), cv::Vec3b(100, 100, 100));  // Not of the object.
+    return cv::mean(image.color, inner)[1];
+  };
+  const Light everywhere{1.0, Eigen::Vector3d::UnitX()};
+  const Light ahead{0.6, -Eigen::Vector3d::UnitZ()}, behind{0.6, Eigen::Vector3d::UnitZ()};
+  const Light aslant{0.6, Eigen::Vector3d(0.0, std::sin(1.0), -std::cos(1.0))};
+  EXPECT_NEAR(brightness(everywhere, everywhere), 100.0, 0.1);
+  EXPECT_NEAR(brightness(ahead, behind), 60.0, 1.0);
+  EXPECT_NEAR(brightness(behind, ahead), 100.0 / 0.6, 2.0);
+  EXPECT_NEAR(brightness(ahead, aslant), 100.0 * (0.6 + 0.4 * std::cos(1.0)), 1.5);
+}
+
 TEST(VirtualObject, TurnedAwayItIsForeshortenedAndFromBehindNotThere) {
   const model::ObjectModel object = FlatObject();
   const VirtualObject surface(object);
@@ -154,7 +198,7 @@ TEST(VirtualObject, WindowHoldsTheObjectAndKeepsItsLimits) {
 }
 
 TEST(Paste, ShowsTheObjectInsideAndTheBackgroundOutside) {
-  VirtualImage object{cv::Mat(40, 60, CV_8UC3, cv::Scalar::all(0)), cv::Mat(40, 60, CV_8UC1, cv::Scalar(0))};
+  VirtualImage object{cv::Mat(40, 60, CV_8UC3, cv::Scalar::all(0)), cv::Mat(40, 60, CV_8UC1, cv::Scalar(0)), cv::Mat()};
   object.color(cv::Rect(20, 10, 20, 20)).setTo(cv::Scalar(10, 20, 250));
   object.mask(cv::Rect(20, 10, 20, 20)).setTo(255);
   const cv::Mat background(50, 70, CV_8UC3, cv::Scalar(200, 100, 50));
