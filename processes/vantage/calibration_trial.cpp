@@ -8,6 +8,7 @@
 #include <random>
 
 #include "assessment/background.h"
+#include "geometry/view_sphere.h"
 #include "model/store.h"
 #include "vantage/held_out_frames.h"
 #include "vantage/known_views.h"
@@ -39,18 +40,17 @@ class Field {
  public:
   Field(const CalibrationOptions& options, const params::LibraryParams& params) : options_(options), params_(params) {
     if (options.world) {
-      simulated_ = std::make_unique<SimulatedObject>(*options.world, kSimulatedFrames, options.seed);
+      std::vector<int> ids(kSimulatedFrames);
+      std::iota(ids.begin(), ids.end(), 0);
+      Part(ids);
+      simulated_ = std::make_unique<SimulatedObject>(*options.world, kSimulatedFrames, judged_ids_,
+                                                     options.turned_deg * M_PI / 180.0, options.seed);
       known_ = simulated_.get();
     } else {
       scene_ = std::make_unique<rgbd::BopScene>(options.folder);
       recorded_ = std::make_unique<RecordedObject>(*scene_, options.object_id);
       known_ = recorded_.get();
-    }
-    int evens = 0;
-    for (const int id : known_->ids()) {
-      const bool even = id % 2 == 0;
-      if (!options.tune) (even ? learned_ids_ : judged_ids_).push_back(id);
-      if (options.tune && even) (evens++ % 2 == 1 ? judged_ids_ : learned_ids_).push_back(id);
+      Part(known_->ids());
     }
     truth_.points_in_mesh = known_->Surface(learned_ids_);
     truth_.correct_m = params.trials.correct_m;
@@ -103,6 +103,16 @@ class Field {
   }
 
  private:
+  // Those that teach from those that judge.
+  void Part(const std::vector<int>& ids) {
+    int evens = 0;
+    for (const int id : ids) {
+      const bool even = id % 2 == 0;
+      if (!options_.tune) (even ? learned_ids_ : judged_ids_).push_back(id);
+      if (options_.tune && even) (evens++ % 2 == 1 ? judged_ids_ : learned_ids_).push_back(id);
+    }
+  }
+
   const CalibrationOptions& options_;
   const params::LibraryParams& params_;
   std::unique_ptr<rgbd::BopScene> scene_;  // Of a recording.
@@ -113,8 +123,20 @@ class Field {
   assessment::Truth truth_;
 };
 
-// The trials of all views, `max_trials` at most.
-assessment::TrialParams TrialsFor(assessment::TrialParams params, int views, int max_trials) {
+// Degrees above the object's horizon of the lowest camera among the frames that count; 90 without any.
+double LowestElevation(const std::vector<assessment::HeldOutFrame>& frames, const assessment::Truth& truth) {
+  double lowest = 90.0;
+  for (const assessment::HeldOutFrame& frame : frames) {
+    if (!frame.counts) continue;
+    lowest =
+        std::min(lowest, geometry::Elevation(geometry::ViewDirection(*frame.T_camera_mesh * truth.T_mesh_object)) * 180.0 / M_PI);
+  }
+  return lowest;
+}
+
+// The trials of all views, `max_trials` at most, from where the frames that judge may have been taken.
+assessment::TrialParams TrialsFor(assessment::TrialParams params, int views, int max_trials, double lowest_deg) {
+  params.min_elevation_deg = std::clamp(lowest_deg, -90.0, 89.0);
   const int wanted = params.trials_per_view;
   params.trials_per_view = std::clamp(max_trials / views, std::min(wanted, kMinTrialsPerView), wanted);
   return params;
@@ -133,7 +155,12 @@ class DrawnModels {
  public:
   DrawnModels(const CalibrationOptions& options, const params::LibraryParams& params, const Field& field,
               const std::vector<assessment::HeldOutFrame>& frames)
-      : options_(options), params_(params), field_(field), frames_(frames), all_(field.Learn()) {
+      : options_(options),
+        params_(params),
+        field_(field),
+        frames_(frames),
+        all_(field.Learn()),
+        lowest_deg_(LowestElevation(frames, field.truth())) {
     alone_ = assessment::TryViewsAlone(all_, field.truth(), frames, params.recogniser);
     std::mt19937 random(options.seed);
     for (const int views : options.views) {
@@ -170,7 +197,7 @@ class DrawnModels {
   void RunOne(std::size_t i) {
     JudgedModel& judged = judged_[i];
     model::ObjectModel object = all_.OnlyViews(chosen_[i]);
-    assessment::TrialParams trials = TrialsFor(params_.trials, judged.views, options_.max_trials);
+    assessment::TrialParams trials = TrialsFor(params_.trials, judged.views, options_.max_trials, lowest_deg_);
     trials.seed = options_.seed + static_cast<std::uint32_t>(i);
     std::mt19937 random(trials.seed);
     auto backgrounds = field_.Backgrounds(&random);
@@ -187,6 +214,7 @@ class DrawnModels {
   const Field& field_;
   const std::vector<assessment::HeldOutFrame>& frames_;
   model::ObjectModel all_;
+  double lowest_deg_;
   std::vector<assessment::ViewTrial> alone_;
   std::vector<std::vector<int>> chosen_;  // View indices of every model.
   std::vector<JudgedModel> judged_;

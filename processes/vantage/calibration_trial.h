@@ -17,7 +17,8 @@ namespace vantage::cli {
 struct CalibrationOptions {
   std::string folder;  // A recording...
   int object_id = 0;
-  std::optional<simulation::WorldParams> world;  // ...or the first object of a simulated world.
+  std::optional<simulation::WorldParams> world;  // ...or the first object of a simulated world...
+  double turned_deg = 0.0;                       // ...which is turned by so much before it judges.
   std::string store;                             // Judges its one object's stored measures; empty = models are drawn.
   std::vector<int> views = {2, 4, 8, 16};
   int draws = 10;                   // Models for each number of views.

@@ -78,11 +78,15 @@ void AddEvaluateCalibration(CLI::App& evaluate, Run& run) {
                               ->type_name("DIR");
   verb->add_option("--mesh", options->meshes,
                    "Instead: objects on a simulated table, one after another, each seen 96 times by a Kinect; half of the looks "
-                   "teach, half judge with the object carried elsewhere and turned, and again with it gone")
+                   "teach, half judge with the object carried elsewhere, and again with it gone")
       ->delimiter(',')
       ->excludes(sequence)
       ->check(CLI::ExistingFile)
       ->type_name("FILE[,...]");
+  verb->add_option("--turned", options->trial.turned_deg,
+                   "With --mesh: it is turned by so much, too, under a lamp that gives 0.45 of the light (see trials.lamp_share)")
+      ->check(CLI::Range(-360.0, 360.0))
+      ->type_name("DEG");
   verb->add_option("--object-id", options->trial.object_id, "The object of scene_gt.json that is learned and looked for")
       ->check(CLI::Range(1, 1000000))
       ->type_name("N");

@@ -13,7 +13,6 @@ namespace vantage::cli {
 namespace {
 
 constexpr int kMinViewPoints = 20;
-constexpr int kLabelBorder = 3;   // Pixels of the label's border that are not learned: edges against the background.
 constexpr int kSurfaceStep = 12;  // Every so manieth pixel of every so manieth row is a point of the true surface.
 const char* const kName = "object";
 
@@ -22,8 +21,7 @@ constexpr double kMinElevationRad = 15.0 * M_PI / 180.0;
 constexpr double kMaxElevationRad = 75.0 * M_PI / 180.0;
 constexpr double kMaxRollRad = 15.0 * M_PI / 180.0;
 constexpr std::array kDistancesM = {0.45, 0.6, 0.8};
-const Eigen::Vector3d kCarriedM(0.23, -0.14, 0.0);  // Before the odd ones.
-constexpr double kTurnedRad = 100.0 * M_PI / 180.0;
+const Eigen::Vector3d kCarriedM(0.23, -0.14, 0.0);  // Before those that judge.
 
 }  // namespace
 
@@ -65,7 +63,7 @@ model::ObjectModel KnownFrames::Learn(const std::vector<int>& ids, const feature
   for (const int id : ids) {
     const auto T_camera_mesh = TruePose(id);
     cv::Mat mask = Mask(id);
-    cv::erode(mask, mask, cv::Mat(), cv::Point(-1, -1), kLabelBorder);
+    cv::erode(mask, mask, cv::Mat(), cv::Point(-1, -1), mask_error_px());
     if (!T_camera_mesh || cv::countNonZero(mask) == 0) continue;
     const rgbd::Frame frame = Load(id);
     const features::Features features = features::Extract(rgbd::Gray(frame), mask, params);
@@ -75,35 +73,35 @@ model::ObjectModel KnownFrames::Learn(const std::vector<int>& ids, const feature
   return object;
 }
 
-SimulatedObject::SimulatedObject(const simulation::WorldParams& params, int frames, std::uint32_t seed)
+SimulatedObject::SimulatedObject(const simulation::WorldParams& params, int frames, const std::vector<int>& carried,
+                                 double turned_rad, std::uint32_t seed)
     : world_(params), seed_(seed * 7919u), frames_(static_cast<std::size_t>(frames)), masks_(frames_.size()) {
   const simulation::TrueObject truth = world_.Truth().at(0);
   name_ = truth.name;
-  const geometry::Rigid carried = Eigen::Translation3d(kCarriedM) * Eigen::AngleAxisd(kTurnedRad, Eigen::Vector3d::UnitZ());
-  T_world_mesh_ = {truth.T_world_object, carried * truth.T_world_object};
+  const geometry::Rigid carry = Eigen::Translation3d(kCarriedM) * Eigen::AngleAxisd(turned_rad, Eigen::Vector3d::UnitZ());
+  T_world_mesh_.assign(frames_.size(), truth.T_world_object);
+  for (const int id : carried) T_world_mesh_.at(static_cast<std::size_t>(id)) = carry * truth.T_world_object;
   const Eigen::Vector3d middle_in_mesh = truth.points.rowwise().mean();
   const auto directions = geometry::EvenDirections(frames);
   const double z_min = std::sin(kMinElevationRad), z_max = std::sin(kMaxElevationRad);
-  for (const int odd : {0, 1}) {
-    world_.MoveObject(0, T_world_mesh_[static_cast<std::size_t>(odd)]);
-    const Eigen::Vector3d middle = T_world_mesh_[static_cast<std::size_t>(odd)] * middle_in_mesh;
-    for (int id = odd; id < frames; id += 2) {
-      const auto i = static_cast<std::size_t>(id);
-      const double z = z_min + (z_max - z_min) * 0.5 * (directions[i].z() + 1.0), across = std::sqrt(1.0 - z * z);
-      const double azimuth = geometry::Azimuth(directions[i]);
-      // Distances change with every second frame, so that even and odd ids have all of them.
-      const double distance_m = kDistancesM[i / 2 % kDistancesM.size()];
-      const Eigen::Vector3d eye = middle + distance_m * Eigen::Vector3d(across * std::cos(azimuth), across * std::sin(azimuth), z);
-      const double roll = kMaxRollRad * std::sin(2.4 * id);
-      const geometry::Rigid T_world_camera =
-          geometry::LookAt(eye, middle, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
-      frames_[i] = world_.Look(T_world_camera, seed_ + static_cast<std::uint32_t>(id));
-      frames_[i].id = id;
-      frames_[i].utime = id;
-      masks_[i] = world_.Labels(T_world_camera) == 0;
-    }
+  for (int id = 0; id < frames; ++id) {
+    const auto i = static_cast<std::size_t>(id);
+    world_.MoveObject(0, T_world_mesh_[i]);
+    const Eigen::Vector3d middle = T_world_mesh_[i] * middle_in_mesh;
+    const double z = z_min + (z_max - z_min) * 0.5 * (directions[i].z() + 1.0), across = std::sqrt(1.0 - z * z);
+    const double azimuth = geometry::Azimuth(directions[i]);
+    // Distances change with every second frame, so that even and odd ids have all of them.
+    const double distance_m = kDistancesM[i / 2 % kDistancesM.size()];
+    const Eigen::Vector3d eye = middle + distance_m * Eigen::Vector3d(across * std::cos(azimuth), across * std::sin(azimuth), z);
+    const double roll = kMaxRollRad * std::sin(2.4 * id);
+    const geometry::Rigid T_world_camera =
+        geometry::LookAt(eye, middle, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
+    frames_[i] = world_.Look(T_world_camera, seed_ + static_cast<std::uint32_t>(id));
+    frames_[i].id = id;
+    frames_[i].utime = id;
+    masks_[i] = world_.Labels(T_world_camera) == 0;
+    ids_.push_back(id);
   }
-  for (int id = 0; id < frames; ++id) ids_.push_back(id);
 }
 
 rgbd::Frame SimulatedObject::Without(int id) {
@@ -117,7 +115,7 @@ rgbd::Frame SimulatedObject::Without(int id) {
 }
 
 std::optional<geometry::Rigid> SimulatedObject::TruePose(int id) const {
-  return frames_.at(static_cast<std::size_t>(id)).T_world_camera->inverse() * T_world_mesh_[static_cast<std::size_t>(id % 2)];
+  return frames_.at(static_cast<std::size_t>(id)).T_world_camera->inverse() * T_world_mesh_[static_cast<std::size_t>(id)];
 }
 
 }  // namespace vantage::cli

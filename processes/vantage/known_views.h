@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +21,7 @@ class KnownFrames {
   virtual const std::vector<int>& ids() const = 0;  // Ascending.
   virtual rgbd::Frame Load(int id) const = 0;
   virtual cv::Mat Mask(int id) const = 0;                             // CV_8UC1, 255 on the object.
+  virtual int mask_error_px() const = 0;                              // The masks' outlines may be off by so much.
   virtual std::optional<geometry::Rigid> TruePose(int id) const = 0;  // T_camera_mesh; nullopt where the object is not listed.
 
   // Points of all these frames' depth on the object, mesh coordinates, metres. Throws std::runtime_error where there are none.
@@ -43,6 +43,7 @@ class RecordedObject : public KnownFrames {
   const std::vector<int>& ids() const override { return scene_.ids(); }
   rgbd::Frame Load(int id) const override { return scene_.Load(id); }
   cv::Mat Mask(int id) const override;
+  int mask_error_px() const override { return 3; }  // Labels are as good as the poses they were drawn at.
   std::optional<geometry::Rigid> TruePose(int id) const override;
 
  private:
@@ -52,17 +53,20 @@ class RecordedObject : public KnownFrames {
 };
 
 // The first object of a simulated world, seen from all sides at elevations of 15 to 75 degrees and three distances, with the
-// sensor's errors. Ids count from 0; even and odd ones each cover the sphere evenly. Before odd looks it is carried elsewhere on
-// the table and turned: what lies about it must not help to find it again.
+// sensor's errors. Ids count from 0; even and odd ones, and every other one of these, cover the sphere evenly. Before the looks of
+// `carried` it is carried elsewhere on the table and turned by `turned_rad` about z: what lies about it must not help to find it
+// again. Turned, it is in other light.
 class SimulatedObject : public KnownFrames {
  public:
   // Throws as SimulatedWorld does. Cost: about 0.2 s a frame on one core.
-  SimulatedObject(const simulation::WorldParams& params, int frames, std::uint32_t seed);
+  SimulatedObject(const simulation::WorldParams& params, int frames, const std::vector<int>& carried, double turned_rad,
+                  std::uint32_t seed);
 
   std::string Where() const override { return name_; }
   const std::vector<int>& ids() const override { return ids_; }
   rgbd::Frame Load(int id) const override { return frames_.at(static_cast<std::size_t>(id)); }
   cv::Mat Mask(int id) const override { return masks_.at(static_cast<std::size_t>(id)); }
+  int mask_error_px() const override { return 0; }
   std::optional<geometry::Rigid> TruePose(int id) const override;
 
   // The same look with the object gone. Not while another thread looks. Cost: 0.1 s.
@@ -75,7 +79,7 @@ class SimulatedObject : public KnownFrames {
   std::vector<int> ids_;
   std::vector<rgbd::Frame> frames_;
   std::vector<cv::Mat> masks_;
-  std::array<geometry::Rigid, 2> T_world_mesh_;  // In even and in odd looks.
+  std::vector<geometry::Rigid> T_world_mesh_;  // Of every look.
 };
 
 }  // namespace vantage::cli
