@@ -76,16 +76,19 @@ void AddEvaluateCalibration(CLI::App& evaluate, Run& run) {
   CLI::Option* sequence = verb->add_option("--sequence", options->trial.folder,
                                            "BOP scene folder with depth, labels and truth: even ids teach, odd ids judge")
                               ->type_name("DIR");
-  verb->add_option("--mesh", options->meshes,
-                   "Instead: objects on a simulated table, one after another, each seen 96 times by a Kinect; half of the looks "
-                   "teach, half judge with the object carried elsewhere, and again with it gone")
-      ->delimiter(',')
-      ->excludes(sequence)
-      ->check(CLI::ExistingFile)
-      ->type_name("FILE[,...]");
+  CLI::Option* mesh =
+      verb->add_option(
+              "--mesh", options->meshes,
+              "Instead: objects on a simulated table, one after another, each seen 96 times by a Kinect; half of the looks "
+              "teach, half judge with the object carried elsewhere, and again with it gone")
+          ->delimiter(',')
+          ->excludes(sequence)
+          ->check(CLI::ExistingFile)
+          ->type_name("FILE[,...]");
   verb->add_option("--turned", options->trial.turned_deg,
-                   "With --mesh: it is turned by so much, too, under a lamp that gives 0.45 of the light (see trials.lamp_share)")
+                   "It is turned by so much, too, under a lamp that gives 0.45 of the light (see trials.lamp_share)")
       ->check(CLI::Range(-360.0, 360.0))
+      ->needs(mesh)
       ->type_name("DEG");
   verb->add_option("--object-id", options->trial.object_id, "The object of scene_gt.json that is learned and looked for")
       ->check(CLI::Range(1, 1000000))
