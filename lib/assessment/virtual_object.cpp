@@ -100,6 +100,7 @@ void CloseGaps(VirtualImage* image) {
   cv::Mat closed;
   cv::morphologyEx(image->mask, closed, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {kReach, kReach}));
   const cv::Mat gaps = closed & ~image->mask;
+  if (cv::countNonZero(gaps) == 0) return;
   cv::Mat known, colors, mean;
   image->mask.convertTo(known, CV_32F, 1.0 / 255.0);
   image->color.convertTo(colors, CV_32FC3);

@@ -24,7 +24,7 @@ geometry::Rigid VirtualCameraPose(const model::View& view, const VirtualPose& po
 struct VirtualImage {
   cv::Mat color;    // CV_8UC3 BGR; black where `mask` is 0.
   cv::Mat mask;     // CV_8UC1, 255 where the object's known surface is seen.
-  cv::Mat normals;  // CV_32FC3, outward, object coordinates, about unit length; zero where unknown.
+  cv::Mat normals;  // CV_32FC3, outward, object coordinates, smoothed, about unit length; zero where unknown. For Relight().
 };
 
 // What falls on an object: light from everywhere and from one lamp.
@@ -65,8 +65,9 @@ struct Disturbance {
   double image_noise = 0.0;  // Sigma, grey levels; >= 0.
 };
 
-// A keyframe's colours hold the light they were taken in. This is what is seen when it changes, the surface being matt: every
-// pixel's brightness changes by the ratio of what falls on it. In place.
+// A keyframe's colours hold the light they were taken in. This is what is seen when it changes, the surface being matt: a pixel of
+// normal n changes by the ratio of what falls on it, a + (1 - a) max(0, n . l) with ambient share a and lamp l; where n is unknown
+// it stays. In place.
 void Relight(const Light& before, const Light& after, VirtualImage* image);
 
 // The object over the background (at least as large; its top left part is used), its outline softened as a lens would.

@@ -42,7 +42,7 @@ class Field {
     if (options.world) {
       std::vector<int> ids(kSimulatedFrames);
       std::iota(ids.begin(), ids.end(), 0);
-      Part(ids);
+      SplitIds(ids);
       simulated_ = std::make_unique<SimulatedObject>(*options.world, kSimulatedFrames, judged_ids_,
                                                      options.turned_deg * M_PI / 180.0, options.seed);
       known_ = simulated_.get();
@@ -50,7 +50,7 @@ class Field {
       scene_ = std::make_unique<rgbd::BopScene>(options.folder);
       recorded_ = std::make_unique<RecordedObject>(*scene_, options.object_id);
       known_ = recorded_.get();
-      Part(known_->ids());
+      SplitIds(known_->ids());
     }
     truth_.points_in_mesh = known_->Surface(learned_ids_);
     truth_.correct_m = params.trials.correct_m;
@@ -104,7 +104,7 @@ class Field {
 
  private:
   // Those that teach from those that judge.
-  void Part(const std::vector<int>& ids) {
+  void SplitIds(const std::vector<int>& ids) {
     int evens = 0;
     for (const int id : ids) {
       const bool even = id % 2 == 0;

@@ -62,8 +62,8 @@ model::ObjectModel KnownFrames::Learn(const std::vector<int>& ids, const feature
   object.feature_fingerprint = params.Fingerprint();
   for (const int id : ids) {
     const auto T_camera_mesh = TruePose(id);
-    cv::Mat mask = Mask(id);
-    cv::erode(mask, mask, cv::Mat(), cv::Point(-1, -1), mask_error_px());
+    cv::Mat mask;  // Of its own: Mask() may lend its pixels.
+    cv::erode(Mask(id), mask, cv::Mat(), cv::Point(-1, -1), mask_error_px());
     if (!T_camera_mesh || cv::countNonZero(mask) == 0) continue;
     const rgbd::Frame frame = Load(id);
     const features::Features features = features::Extract(rgbd::Gray(frame), mask, params);
